@@ -17,9 +17,10 @@ from arc_suite.cpg.gait import gait_of
 from arc_suite.cpg.law import Drive, Pattern, joint_targets, proprioception
 from arc_suite.models.overlap import find_largest_stretch
 from arc_suite.models.sizing import size_body
-from arc_suite.models.standing import GRAVITY, measure_standing
+from arc_suite.models.standing import PoseMechanics, measure_standing
 from arc_suite.models.stride import FOOT_LIFT, cycle_angles, strokes
 from arc_suite.tasks.contract import Task
+from arc_suite.tasks.fitting import speed_unit
 
 _MIN_FROUDE = 1e-3
 
@@ -80,20 +81,16 @@ class Stride(NamedTuple):
         gait = gait_of(task)
         pose = measure_standing(task.scene.body)  # the task has measured this body, so the result is in a cache
         body = size_body(task.scene.body)
-        speed = gait.pace * froude * math.sqrt(GRAVITY * pose.height)
+        speed = gait.pace * froude * speed_unit(pose.height)
         # A foot on the ground moves from +reach to -reach during its stance, m.
         reach = 0.5 * speed * gait.duty_factor / gait.frequency
         if reach == 0.0:
             reach = 1e-6 * pose.height
         joint_counts = [len(leg.joints) for leg in body.legs]
         leg_strokes = strokes(task.scene.body, reach)  # sweep and lift of each leg, (joints of the leg,), rad
-        centers = []
-        for jacobian, (sweep, lift) in zip(pose.jacobians, leg_strokes, strict=True):
-            sweep_share = np.clip(jacobian[0] @ sweep / reach, 0.0, 1.0)  # of the reach that the leg can sweep
-            centers.append((1.0 - sweep_share) * UNLOADED_HEIGHT / FOOT_LIFT * lift)
         sweep = np.concatenate([sweep for sweep, _ in leg_strokes])
         lift = np.concatenate([lift for _, lift in leg_strokes])
-        center = np.concatenate(centers)
+        center = np.concatenate(_lift_centers(pose, leg_strokes, reach))
         offset = np.repeat(gait.offsets, joint_counts)
 
         def stretch_strides(stretch: float) -> np.ndarray:
@@ -140,6 +137,23 @@ class Stride(NamedTuple):
         phase = (pattern.frequency * time[..., None] + pattern.offset) % 1.0  # cycles
         in_stance = phase < pattern.duty_factor
         return self.drive.actions(targets, target_velocities, angles, velocities, self.held * in_stance)
+
+
+def _lift_centers(
+    pose: PoseMechanics, leg_strokes: list[tuple[np.ndarray, np.ndarray]], reach: float
+) -> list[np.ndarray]:
+    """Return for each leg the angles (joints of the leg,), rad, about which it moves: the less it sweeps, the higher.
+
+    Args:
+        pose: the standing pose.
+        leg_strokes: sweep and lift of each leg, (joints of the leg,), rad.
+        reach: half of the way of a foot in stance, m.
+    """
+    centers = []
+    for jacobian, (sweep, lift) in zip(pose.jacobians, leg_strokes, strict=True):
+        sweep_share = np.clip(jacobian[0] @ sweep / reach, 0.0, 1.0)  # of the reach that the leg can sweep
+        centers.append((1.0 - sweep_share) * UNLOADED_HEIGHT / FOOT_LIFT * lift)
+    return centers
 
 
 class StrideState(NamedTuple):

@@ -1,16 +1,15 @@
 """Blocks of an observation: the parts of each block, and its noise."""
 
 import itertools
-import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.models.standing import GRAVITY
 from arc_suite.robots.mirror import Image
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import mirrors
+from arc_suite.tasks.fitting import rate_unit, speed_unit
 from arc_suite.tasks.mirrors import Mirror
 from arc_suite.tasks.parts import HEADED, ROTATIONS, WORLD, Joints, Part, Phase, Quaternion, RigidParts, Scalar, Vector
 
@@ -116,17 +115,15 @@ def velocities(body: Body, headed: bool = False) -> Block:
         headed: whether the linear velocity is relative to the heading; else it is in the world's frame.
     """
     height = body.torso.standing_height
-    velocity_unit = math.sqrt(GRAVITY * height)
-    rate_unit = math.sqrt(GRAVITY / height)
     parts = (
         Vector("torso velocity", "m/s", HEADED if headed else WORLD),
         Vector("torso angular velocity", "rad/s", ROTATIONS, axial=True),
         Joints(body, "velocity of {}", "rad/s"),
     )
     noise = (
-        LINEAR_VELOCITY_NOISE * velocity_unit,
-        ANGULAR_VELOCITY_NOISE * rate_unit,
-        JOINT_VELOCITY_NOISE * rate_unit,
+        LINEAR_VELOCITY_NOISE * speed_unit(height),
+        ANGULAR_VELOCITY_NOISE * rate_unit(height),
+        JOINT_VELOCITY_NOISE * rate_unit(height),
     )
     return Block(parts, noise, sensed=(False, True, True))
 

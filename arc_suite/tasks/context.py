@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from arc_suite.models.sizing import time_unit
 from arc_suite.models.standing import GRAVITY, measure_standing
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import STEPS
@@ -61,7 +62,7 @@ class Context(NamedTuple):
             leak=leak,
             leaks=np.full(3, leak),
             steps=int(step_limit) if math.isfinite(step_limit) else STEPS,
-            tempo=float(np.sqrt(body.torso.standing_height / GRAVITY) / scene.control_timestep),
+            tempo=time_unit(body) / scene.control_timestep,
             reference=reference,
         )
 

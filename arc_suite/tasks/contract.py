@@ -56,7 +56,7 @@ LEVEL = "level"
 _CLEARANCE = 0.01  # standing heights; feet start at least so far above the ground
 _RINGS = (0.35, 0.7, 0.9)  # distances from a foot's center at which the ground is measured, shares of the ball's radius
 _DIRECTIONS = 8  # points on each ring
-# These points (points, 2), and the heights (points,) of the center over the ball's lower side there, both in radii.
+# Points (points, 2) on the rings, forward and left of the foot's center, in radii.
 _POINTS_AROUND_FOOT = np.array(
     [
         (distance * math.cos(angle), distance * math.sin(angle))
@@ -64,6 +64,7 @@ _POINTS_AROUND_FOOT = np.array(
         for angle in np.arange(_DIRECTIONS) * (2.0 * math.pi / _DIRECTIONS)
     ]
 )
+# Heights (points,) of the center over the lower side of the ball at these points, in radii.
 _BALL_HEIGHTS = np.sqrt(1.0 - np.repeat(_RINGS, _DIRECTIONS) ** 2)
 
 
@@ -134,7 +135,7 @@ class Observed(ABC):
         Raises:
             ValueError: they are not those that the task declares.
         """
-        self._check(blocks)
+        self._check_sizes(blocks)
         arrays = list(blocks.values())
         return arrays[0].__array_namespace__().concatenate(arrays, axis=-1, dtype=dtype)
 
@@ -144,10 +145,11 @@ class Observed(ABC):
         Raises:
             ValueError: they are not those that the task declares.
         """
-        self._check(blocks)
+        self._check_sizes(blocks)
         return collections.OrderedDict({name: block.copy() for name, block in blocks.items()})
 
-    def _check(self, blocks: Mapping[str, np.ndarray]) -> None:
+    def _check_sizes(self, blocks: Mapping[str, np.ndarray]) -> None:
+        """Raise ValueError for blocks with other names, sizes or order than those that the task declares."""
         if [(name, block.shape[-1]) for name, block in blocks.items()] != self._sizes_in_order:
             sizes = {name: block.shape[-1] for name, block in blocks.items()}
             raise ValueError(f"observation of {self.name}: expected blocks {self.sizes}, got {sizes}")
@@ -346,16 +348,21 @@ class Task(Observed):
         xp = readings.foot_heights.__array_namespace__()
         rise = (self.clearances - readings.foot_heights).max(axis=-1)
         if not self.scene.arena.is_level:
-            radii = xp.asarray(self.clearances)[..., None]
-            offsets = radii[..., None] * xp.asarray(_POINTS_AROUND_FOOT)
-            feet = readings.foot_positions
-            ground = self.scene.arena.height(feet[..., None, 0] + offsets[..., 0], feet[..., None, 1] + offsets[..., 1])
-            lowest_centers = ground + radii * xp.asarray(_BALL_HEIGHTS)  # where the ball touches the ground
-            rise = xp.maximum(rise, (lowest_centers - feet[..., None, 2]).max(axis=(-2, -1)))
+            depths = self._lowest_centers(readings) - readings.foot_positions[..., None, 2]
+            rise = xp.maximum(rise, depths.max(axis=(-2, -1)))
         rise = rise.clip(0.0)
         x, y, z = (readings.torso_position[..., axis] for axis in range(3))
         position = xp.stack([x, y, z + rise], axis=-1)
         return xp.concatenate([position, readings.qpos[..., 3:]], axis=-1)
+
+    def _lowest_centers(self, readings: Readings):
+        """Return the heights (..., legs, points) of feet, m, at which they touch the ground at points around them."""
+        feet = readings.foot_positions
+        xp = feet.__array_namespace__()
+        radii = xp.asarray(self.clearances)[..., None]
+        offsets = radii[..., None] * xp.asarray(_POINTS_AROUND_FOOT)
+        ground = self.scene.arena.height(feet[..., None, 0] + offsets[..., 0], feet[..., None, 1] + offsets[..., 1])
+        return ground + radii * xp.asarray(_BALL_HEIGHTS)
 
     @functools.cached_property
     def clearances(self) -> np.ndarray:

@@ -26,17 +26,25 @@ JOINT_ANGLE_NOISE = 0.1  # rad, as published
 JOINT_VELOCITY_NOISE = 0.02  # sqrt(g / h); published: 0.014 to 0.03
 
 
+def speed_unit(height: float) -> float:
+    """Return sqrt(g h), m/s, for a standing height, m."""
+    return math.sqrt(GRAVITY * height)
+
+
+def rate_unit(height: float) -> float:
+    """Return sqrt(g / h), 1/s, for a standing height, m."""
+    return math.sqrt(GRAVITY / height)
+
+
 def fitted_parameters(body: Body) -> dict:
     """Return parameters of walk for any body: units as in `parameters.Parameters`, a number for each noise."""
     height = body.torso.standing_height
-    velocity_unit = math.sqrt(GRAVITY * height)
-    rate_unit = math.sqrt(GRAVITY / height)
-    speed = TARGET_FROUDE * velocity_unit
+    speed = TARGET_FROUDE * speed_unit(height)
     gait = fitted_gait(body)
     return {
         "target_velocity": speed,
         "velocity_band": BAND * speed,
-        "gait_frequency": gait_frequency(body) * rate_unit,
+        "gait_frequency": gait_frequency(body) * rate_unit(height),
         "duty_factor": gait.duty_factor,
         "phase_offsets": tuple(2.0 * math.pi * offset for offset in gait.offsets),
         "stance_threshold": max(leg.foot.radius for leg in body.legs) + STANCE_HEIGHT * height,
@@ -49,15 +57,13 @@ def fitted_parameters(body: Body) -> dict:
 def fitted_noise(body: Body) -> dict[str, float]:
     """Return every noise of a start that suits any body: names and units as in `parameters.Noise`."""
     height = body.torso.standing_height
-    velocity_unit = math.sqrt(GRAVITY * height)
-    rate_unit = math.sqrt(GRAVITY / height)
     return {
         "position_noise": POSITION_NOISE * height,
         "orientation_noise": ORIENTATION_NOISE,
-        "linear_velocity_noise": LINEAR_VELOCITY_NOISE * velocity_unit,
-        "angular_velocity_noise": ANGULAR_VELOCITY_NOISE * rate_unit,
+        "linear_velocity_noise": LINEAR_VELOCITY_NOISE * speed_unit(height),
+        "angular_velocity_noise": ANGULAR_VELOCITY_NOISE * rate_unit(height),
         "joint_angle_noise": JOINT_ANGLE_NOISE,
-        "joint_velocity_noise": JOINT_VELOCITY_NOISE * rate_unit,
+        "joint_velocity_noise": JOINT_VELOCITY_NOISE * rate_unit(height),
     }
 
 

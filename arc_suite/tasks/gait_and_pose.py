@@ -5,7 +5,6 @@ touchdowns of every gait are exact. The phase continues when the command changes
 """
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from typing import Any, ClassVar, NamedTuple, Self
 
@@ -21,6 +20,7 @@ from arc_suite.tasks.blocks import Block, gait_clock
 from arc_suite.tasks.clock import TWO_PI
 from arc_suite.tasks.command import BAND, COMMANDS, LONGEST, SHORTEST, begins_next, scheduled_value
 from arc_suite.tasks.context import Context
+from arc_suite.tasks.fitting import rate_unit
 from arc_suite.tasks.parts import ROTATIONS, Legs, Planar, Scalar
 
 CYCLE = 1 << 20  # units of the clock in a cycle of the gait
@@ -170,7 +170,6 @@ class GaitAndPose:
         """Return the reference of a body, in a task with `parameters.Parameters`."""
         body = scene.body
         rest_pose = posture.find_pose_with_room(body)
-        height = body.torso.standing_height
         control_timestep = scene.control_timestep
         prescribed = np.append(parameters.phase_offsets / TWO_PI, (parameters.duty_factor, parameters.gait_frequency))
         choices = Choices(
@@ -183,7 +182,7 @@ class GaitAndPose:
             feet=rest_pose.sole_positions[:, :2],
             angles=rest_pose.legs.by_joint(rest_pose.joint_angles),
             angle_jacobian=posture.linearize_joint_angles(body),
-            glide=_MAX_POSE_SPEED * math.sqrt(GRAVITY / height) * control_timestep,
+            glide=_MAX_POSE_SPEED * rate_unit(body.torso.standing_height) * control_timestep,
             step=control_timestep,
             gait=to_clock_units(prescribed, control_timestep),
             choices=choices,

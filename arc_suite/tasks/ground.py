@@ -255,12 +255,9 @@ class Level(Ground):
     def with_settings(self, overrides: Mapping[str, Any]) -> Self:
         """Return the ground with checked settings."""
         start = checks.name(overrides.get("start", self.start), STARTS, "start")
-        curriculum = checks.boolean("curriculum", overrides.get("curriculum", self.curriculum))
-        level = checks.integer("level", overrides.get("level", self.level), 0, LEVELS - 1)
+        curriculum, level = _check_curriculum(self, overrides)
         if curriculum and not overrides.get("commands"):
             raise ValueError("curriculum: needs the setting commands, whose ranges it widens")
-        if level and not curriculum:
-            raise ValueError(f"level: needs the setting curriculum=True, got {level}")
         scan = checks.boolean("scan", overrides.get("scan", self.scan))
         return dataclasses.replace(self, start=start, curriculum=curriculum, level=level, scan=scan)
 
@@ -368,15 +365,12 @@ class Lanes(Ground):
         for name in size_names:
             sizes[name] = checks.number(name, values[name], *terrain.SIZES[name])
         difficulty = checks.number("difficulty", values["difficulty"], 0.0, 1.0)
-        curriculum = checks.boolean("curriculum", values["curriculum"])
-        level = checks.integer("level", values["level"], 0, LEVELS - 1)
+        curriculum, level = _check_curriculum(self, overrides)
         if curriculum and "difficulty" in overrides:
             raise ValueError(
                 "difficulty: expected none with curriculum=True, as each level has its own, "
                 f"got {overrides['difficulty']}"
             )
-        if level and not curriculum:
-            raise ValueError(f"level: needs the setting curriculum=True, got {level}")
         return dataclasses.replace(
             self,
             difficulty=difficulty,
@@ -469,10 +463,7 @@ class Lanes(Ground):
         return fell | memory.is_stuck, memory.has_left
 
     def observe(self, context: Context, memory: Lane, place, readings: Readings) -> dict:
-        """Return the heights (..., 175) of the ground at `sensors.SCAN`, in h, clipped to [-1, 1].
-
-        0 is the height of the ground if the torso is at its standing height.
-        """
+        """Return the height scan."""
         return observe_scan(context, place, readings)
 
     def progress(self, memory: Lane) -> dict:
@@ -485,6 +476,19 @@ class Lanes(Ground):
     def stream_state(self, memory: Lane, outcome, fell) -> Stream:
         """Return the level and the outcome of the episode."""
         return Stream(memory.level, outcome, fell | memory.is_stuck, memory.visits)
+
+
+def _check_curriculum(ground: Level | Lanes, overrides: Mapping[str, Any]) -> tuple[bool, int]:
+    """Return whether there is a curriculum, and the level at which it begins: settings of a ground, overridden.
+
+    Raises:
+        ValueError: a value that does not fit, or a level without a curriculum.
+    """
+    curriculum = checks.boolean(CURRICULUM, overrides.get(CURRICULUM, ground.curriculum))
+    level = checks.integer(LEVEL, overrides.get(LEVEL, ground.level), 0, LEVELS - 1)
+    if level and not curriculum:
+        raise ValueError(f"level: needs the setting curriculum=True, got {level}")
+    return curriculum, level
 
 
 class Pillared(NamedTuple):

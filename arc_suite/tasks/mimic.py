@@ -20,14 +20,14 @@ import numpy as np
 from arc_suite import checks, rotations
 from arc_suite.markers import Marker
 from arc_suite.models.sizing import position_gains, size_body
-from arc_suite.models.standing import GRAVITY, measure_standing
+from arc_suite.models.standing import measure_standing
 from arc_suite.motions import Motion, check_body, motion_text, striding
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import blocks, parameters, parts
 from arc_suite.tasks import readings as reading
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.contract import FileSetting, Inputs, Start, Task
-from arc_suite.tasks.fitting import reach
+from arc_suite.tasks.fitting import rate_unit, reach
 from arc_suite.tasks.ghost import draw_pose
 from arc_suite.tasks.motion_tables import POSES_AHEAD, MotionTables, split_next_angles
 from arc_suite.tasks.parameters import Noise, Parameters
@@ -164,14 +164,11 @@ class Mimic(Task):
     @functools.cached_property
     def tables(self) -> MotionTables:
         """The tables of the motions."""
-        tables = MotionTables.of(self.scene.body, self.settings.motions, self.scene.control_timestep, self._rate_unit)
+        scene = self.scene
+        tables = MotionTables.of(scene.body, self.settings.motions, scene.control_timestep, rate_unit(self._height))
         if self.settings.both_sides and not tables.mirror_offset:
-            raise ValueError(f"both_sides: {self.scene.body.name} has no left-right symmetry, expected False")
+            raise ValueError(f"both_sides: {scene.body.name} has no left-right symmetry, expected False")
         return tables
-
-    @property
-    def _rate_unit(self) -> float:
-        return math.sqrt(GRAVITY / self._height)
 
     @property
     def _height(self) -> float:

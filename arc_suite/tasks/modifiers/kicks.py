@@ -1,6 +1,5 @@
 """Kicks: sudden changes of the torso's velocity."""
 
-import math
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple, Self
 
@@ -11,6 +10,7 @@ from arc_suite.markers import Marker
 from arc_suite.models.standing import GRAVITY
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.blocks import Block
+from arc_suite.tasks.fitting import speed_unit
 from arc_suite.tasks.modifiers.arrows import draw_arrow
 from arc_suite.tasks.modifiers.draws import Episode
 from arc_suite.tasks.modifiers.modifier import Modifier
@@ -77,7 +77,7 @@ class Kicks(_KicksFields, Modifier):
         """Return the schedule of the episode."""
         stream = episode.stream
         directions = np.stack([np.cos(stream.kick_directions), np.sin(stream.kick_directions)], axis=-1)
-        greatest = self.kicks * math.sqrt(GRAVITY * episode.scene.body.torso.standing_height)  # m/s
+        greatest = self.kicks * speed_unit(episode.scene.body.torso.standing_height)  # m/s
         return KicksState(stream.kick_steps, greatest * stream.kick_sizes[:, None] * directions)
 
     def drive(self, state: KicksState, inputs: Inputs, elapsed) -> Inputs:
@@ -105,6 +105,5 @@ class Kicks(_KicksFields, Modifier):
         period = state.steps[-1]
         steps_since_kick = elapsed - state.steps
         is_shown = (steps_since_kick >= 0) & (steps_since_kick % period < ARROW_STEPS)
-        velocity_unit = math.sqrt(GRAVITY * scene.body.torso.standing_height)  # m/s
-        for kick in state.kicks[is_shown] / velocity_unit:
+        for kick in state.kicks[is_shown] / speed_unit(scene.body.torso.standing_height):
             yield from draw_arrow(scene.body, readings, kick)
