@@ -152,9 +152,8 @@ def shortest_path(
     costs[_START] = 0.0
     previous_points = np.zeros(len(points), int)
     is_visited = np.zeros(len(points), bool)
-    queue: list[tuple[Any, Any]] = [
-        (goal_distances[_START], _START)
-    ]  # lower bounds of the costs of paths through points, and the points
+    # Lower bounds of the costs of paths through points, and the points.
+    queue: list[tuple[Any, Any]] = [(goal_distances[_START], _START)]
     while queue:
         _, point = heapq.heappop(queue)
         if point == _GOAL:

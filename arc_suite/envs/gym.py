@@ -4,7 +4,7 @@ import os
 import sys
 import types
 import weakref
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium
@@ -91,13 +91,8 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
             ValueError: an unknown name, or a value that does not fit.
         """
         refuse_arguments(others, type(self).__init__, task_name)
-        modes = [*_HEADLESS_MODES]
-        if opengl.has_display():
-            modes.append("human")
-        if render_mode == "human" and render_mode not in modes:
-            raise ValueError(f"render_mode 'human' needs a display, and there is none; use {' or '.join(modes)}")
-        if render_mode is not None:
-            checks.name(render_mode, modes, "render_mode")
+        modes = [*_HEADLESS_MODES, "human"] if opengl.has_display() else [*_HEADLESS_MODES]
+        _check_render_mode(render_mode, modes)
         picture_options = pictures.options(render_mode, width, height, camera_id)
         if checks.boolean("visualize_reward", visualize_reward) and render_mode is None:
             raise ValueError("visualize_reward=True: goes with a render_mode, such as 'rgb_array'")
@@ -297,6 +292,15 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
 
     def __getstate__(self):
         return self.__dict__ | {"_window": None}
+
+
+def _check_render_mode(render_mode: str | None, modes: Sequence[str]) -> None:
+    """Raise ValueError for a render mode that does not exist, or that does not work on this machine."""
+    if render_mode is None:
+        return
+    if render_mode == "human" and "human" not in modes:
+        raise ValueError(f"render_mode 'human' needs a display, and there is none; use {' or '.join(modes)}")
+    checks.name(render_mode, modes, "render_mode")
 
 
 def _step_limit_of_make(caller: types.FrameType) -> int | None:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from arc_suite import checks
+from arc_suite.robots.field_hints import GRAVITY_HINT
 from arc_suite.tasks.contract import Task
 
 # Argument -> terms of a reward that take its place, of which a task has one, and the sign of their weights.
@@ -26,7 +27,7 @@ HINTS = {
     "dt": _CONTROL_STEP,
     "frame_skip": _CONTROL_STEP,
     "timestep": _CONTROL_STEP,
-    "gravity": "change_model({'gravity': [0.0, 0.0, -1.62]}) of the environment sets it",
+    "gravity": GRAVITY_HINT,
     "xml_file": "arc_suite.envs.gym.Env('go2.xml', 'walk') opens a robot from a file",
     "render_fps": "pictures have the rate of control steps, metadata['render_fps']",
     "camera_name": "camera_id takes names, too, with a render_mode",

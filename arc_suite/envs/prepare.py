@@ -4,7 +4,7 @@ import inspect
 import json
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -95,34 +95,39 @@ _HINTS = {
 
 
 def refuse_arguments(arguments: Mapping[str, Any], function: Callable, task_name: str | None = None) -> None:
-    """Raise ValueError for arguments that a function does not have; the error names what takes their place.
+    """Raise ValueError for arguments that a function does not have; the error names what takes the first one's place.
 
     Args:
         arguments: arguments that no parameter of the function takes, by name.
         function: function that opens an environment.
         task_name: task of the environment, one.
     """
-    hints = gymnasium_arguments.HINTS | _HINTS
     for name, value in arguments.items():
         cures = None
         if task_name is not None:
             cures = gymnasium_arguments.find_settings(name, value, registry.task_of(task_name))
         if cures:
             raise ValueError(f"argument {name!r}: write task_kwargs={checks.preview(cures)} in its place")
-        if name in hints:
-            raise ValueError(f"argument {name!r}: {hints[name]}")
-        setting_names = registry.setting_names()
-        if name in setting_names:
-            setting = f"{{{name!r}: {checks.preview(value)}}}"
-            raise ValueError(f"argument {name!r}: it is a setting of the task; write task_kwargs={setting}")
         valid_names = [key for key in inspect.signature(function).parameters if key not in ("self", "others")]
-        settings_meant = [word for word in checks.meanings(name) if word in setting_names and word not in hints]
-        if settings_meant and not any(meaning in valid_names for meaning in checks.meanings(name)):
-            setting = f"{{{settings_meant[0]!r}: {checks.preview(value)}}}"
-            raise ValueError(f"unknown argument {name!r}; did you mean task_kwargs={setting}?")
-        hint = checks.hint(name, [*valid_names, *setting_names])
-        arguments_text = ", ".join(valid_names)
-        raise ValueError(f"unknown argument {name!r}{hint} (there are: {arguments_text}; task_kwargs has the settings)")
+        raise ValueError(_explain_argument(name, value, valid_names))
+
+
+def _explain_argument(name: str, value: Any, valid_names: Sequence[str]) -> str:
+    """Return the error about an argument that a function with parameters of valid names does not have."""
+    hints = gymnasium_arguments.HINTS | _HINTS
+    if name in hints:
+        return f"argument {name!r}: {hints[name]}"
+    setting_names = registry.setting_names()
+    if name in setting_names:
+        setting = f"{{{name!r}: {checks.preview(value)}}}"
+        return f"argument {name!r}: it is a setting of the task; write task_kwargs={setting}"
+    meanings = checks.meanings(name)
+    settings_meant = [word for word in meanings if word in setting_names and word not in hints]
+    if settings_meant and not any(meaning in valid_names for meaning in meanings):
+        setting = f"{{{settings_meant[0]!r}: {checks.preview(value)}}}"
+        return f"unknown argument {name!r}; did you mean task_kwargs={setting}?"
+    hint = checks.hint(name, [*valid_names, *setting_names])
+    return f"unknown argument {name!r}{hint} (there are: {', '.join(valid_names)}; task_kwargs has the settings)"
 
 
 def _take_modifier_settings(settings: dict[str, Any]) -> dict[str, Any]:

@@ -171,9 +171,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         task_kwargs = dict(checks.mapping("task_kwargs", task_kwargs))
         seed = task_kwargs.pop("random", None)
         checks.name(task_kwargs.pop("on_divergence", "truncate"), ["truncate"], "on_divergence of many environments")
-        mode_name = autoreset_mode.value if isinstance(autoreset_mode, AutoresetMode) else autoreset_mode
-        valid_modes = [mode.value for mode in AutoresetMode]
-        self.autoreset_mode = AutoresetMode(checks.name(mode_name, valid_modes, "autoreset_mode"))
+        self.autoreset_mode = _checked_autoreset_mode(autoreset_mode)
         if render_mode is not None:
             checks.name(render_mode, _RENDER_MODES, "render_mode")
         self.num_envs = checks.integer("num_envs", num_envs, 1, MAX_ENVS)
@@ -721,6 +719,17 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
                 self._randoms[index] = np.random.RandomState(seeds[index])
                 self._stream_seeds[index] = seeds[index]
                 self._streams_begin[index] = True
+
+
+def _checked_autoreset_mode(autoreset_mode: str | AutoresetMode) -> AutoresetMode:
+    """Return a mode, given the mode or its value.
+
+    Raises:
+        ValueError: there is no such mode.
+    """
+    name = autoreset_mode.value if isinstance(autoreset_mode, AutoresetMode) else autoreset_mode
+    valid_names = [mode.value for mode in AutoresetMode]
+    return AutoresetMode(checks.name(name, valid_names, "autoreset_mode"))
 
 
 def _join_tasks(tasks: Sequence[Task]) -> Task:

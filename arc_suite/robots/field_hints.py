@@ -9,6 +9,7 @@ from arc_suite.robots.spec import Ballast, Body, Foot, Joint, Leg, Link, Motor, 
 _FIELDS_OF_IMPORTED = ("source", "held", "file_joints", "servo", "alias")
 _SPECS = (Body, Torso, Leg, Link, Joint, Motor, Foot, Solid, Ballast, Simulation)
 
+GRAVITY_HINT = "environment.change_model({'gravity': [0.0, 0.0, -1.62]}) sets it"
 _WEIGHT = "density of the body sets the weight of all parts, ballast adds some"
 _COLORS = "palette of the body has its colors"
 _SPEED = "it is a setting of tasks, --set target_velocity=VALUE"
@@ -27,7 +28,7 @@ _CURES = {
     "feet": "each leg has its foot",
     "friction": "it is a setting of tasks, --set friction=VALUE",
     "gait": "it is a setting of tasks, --set gait=VALUE",
-    "gravity": "environment.change_model({'gravity': [0.0, 0.0, -1.62]}) sets it",
+    "gravity": GRAVITY_HINT,
     "height": "standing_height of the torso sets it",
     "length": "end sets it: [x, y, z] from the start of the link, m",
     "joints": "each link has its joint",

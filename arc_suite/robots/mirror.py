@@ -130,16 +130,19 @@ def _match_legs(leg: Leg, candidate: Leg, tolerance: _Tolerance) -> list[int] | 
             continue
         cosine = (_joint_axis(leg, link) * _AXIS_REFLECTION) @ _joint_axis(candidate, other_link)
         sign = 1 if cosine > 0.0 else -1
-        reflected_range = sorted(sign * limit for limit in link.joint.range_deg)
-        numbers = [*reflected_range, *_drive_numbers(link.joint)]
-        other_numbers = [*other_link.joint.range_deg, *_drive_numbers(other_link.joint)]
-        pairs = zip(numbers, other_numbers, strict=True)
-        if not (
-            tolerance.are_parallel(cosine) and all(tolerance.numbers_match(first, second) for first, second in pairs)
-        ):
+        if not (tolerance.are_parallel(cosine) and _joints_match(link.joint, other_link.joint, sign, tolerance)):
             return None
         signs.append(sign)
     return signs
+
+
+def _joints_match(joint: Joint, candidate: Joint, sign: int, tolerance: _Tolerance) -> bool:
+    """Return whether range and drive of a joint are those of another, whose angles have a sign, 1 or -1, to it."""
+    reflected_range = sorted(sign * limit for limit in joint.range_deg)
+    numbers = [*reflected_range, *_drive_numbers(joint)]
+    other_numbers = [*candidate.range_deg, *_drive_numbers(candidate)]
+    pairs = zip(numbers, other_numbers, strict=True)
+    return all(tolerance.numbers_match(number, other_number) for number, other_number in pairs)
 
 
 def _joint_axis(leg: Leg, link: Link) -> np.ndarray:

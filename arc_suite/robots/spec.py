@@ -828,6 +828,7 @@ class Body(_Spec):
     def _check_source(self) -> None:
         """Raise SpecError for fields that only bodies with a source may have, or only bodies without one."""
         joints_have_servos = [joint.servo is not None for joint in self.joints]
+        expected_default = "expected the default in a body with a source, which has"
         if self.source is None:
             if any(joints_have_servos):
                 self._fail("legs", "expected no servos in a body without a source")
@@ -841,11 +842,11 @@ class Body(_Spec):
         elif self.ballast:
             self._fail("ballast", "expected none in a body with a source, which has its weights")
         elif self.agility != 1.0:
-            self._fail("agility", "expected the default in a body with a source, which has its motors and weights")
+            self._fail("agility", f"{expected_default} its motors and weights")
         elif self.density != DENSITY:
-            self._fail("density", "expected the default in a body with a source, which has its motors and weights")
+            self._fail("density", f"{expected_default} its motors and weights")
         elif not self.ornaments:
-            self._fail("ornaments", "expected the default in a body with a source, which has the looks of its file")
+            self._fail("ornaments", f"{expected_default} the looks of its file")
         elif self.simulation is None:
             self._fail("simulation", "missing; a body with a source needs it")
 

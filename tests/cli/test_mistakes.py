@@ -109,7 +109,7 @@ OTHERS |= {
     "evaluate --gravity=1.62": "unknown flag 'gravity'; environment.change_model sets it, see docs/environments.md\n",
     "evaluate --terrain=rough": "unknown flag 'terrain'; did you mean 'arena'? (there are: ",
     "evaluate --wind=1": "unknown flag 'wind'; did you mean --set force=1?\n",
-    "evaluate --set gravity=1": "setting 'gravity': change_model({'gravity': [0.0, 0.0, -1.62]}) of the environment",
+    "evaluate --set gravity=1": "setting 'gravity': environment.change_model({'gravity': [0.0, 0.0, -1.62]})",
     "evaluate --set terrain=rough": "unknown setting of walk 'terrain'; did you mean 'arena'? (there are: ",
     f"build_model --legs=8 --{BRITISH}=red": f"unknown flag '{BRITISH}'; did you mean 'palette'? (there are: ",
     "evaluate --chekpoint=runs/tick": "unknown flag 'chekpoint'; did you mean 'policy'? (there are: ",
