@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import rotations
-from arc_suite.cpg.command_law import Request
+from arc_suite.cpg.command_law import Request, read_vertical
 from arc_suite.cpg.footholds import find_scan_points
 from arc_suite.cpg.stepping import Stepping, SteppingParameters
 from arc_suite.models import foot_paths, posture
@@ -117,7 +116,7 @@ class Climbing(Stepping):
 
     def follow_request(self, state: ClimbingState, request: Request, observation: Mapping) -> tuple:
         """Return the next state, target angles (environments, joints), rad, and their change; see `CommandLaw`."""
-        vertical = rotations.matrix(observation["posture"][:, 1:5])[:, 2]  # the world's, in the torso's frame
+        vertical = read_vertical(observation)
         scan = observation["scan"] * self.mechanics.height  # m, over the ground of a torso at the standing height
         heights = self.fill_trenches(scan)
         # A product of matrices would round otherwise in a batch.

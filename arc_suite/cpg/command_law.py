@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from arc_suite import rotations
 from arc_suite.cpg.drives import drive
 from arc_suite.cpg.gait import gait_of
 from arc_suite.cpg.law import proprioception
@@ -52,6 +53,11 @@ class Request(NamedTuple):
     size: np.ndarray
     phase: np.ndarray
     advance: np.ndarray
+
+
+def read_vertical(observation: Mapping):
+    """Return the world's vertical (environments, 3) in the torso's frame, given the blocks of the observation."""
+    return rotations.matrix(observation["posture"][:, 1:5])[:, 2]
 
 
 class CommandLaw(ABC):

@@ -12,9 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import rotations
 from arc_suite.cpg import footholds, leaps
-from arc_suite.cpg.command_law import Request
+from arc_suite.cpg.command_law import Request, read_vertical
 from arc_suite.cpg.leaps import Leap
 from arc_suite.cpg.sighted import Sighted, SightedParameters, SightedState
 from arc_suite.models import posture
@@ -175,8 +174,7 @@ class Leaping(Sighted):
         standing_height = self.mechanics.height
         parameters = self._leaping_parameters
         soles, _ = self.legs.soles(self.legs.by_leg(posture_block[:, 5:]))
-        vertical = rotations.matrix(posture_block[:, 1:5])[:, None, 2]  # the world's, in the torso's frame
-        sole_heights = (soles * vertical).sum(axis=-1)
+        sole_heights = (soles * read_vertical(observation)[:, None]).sum(axis=-1)
         median_height = xp.median(sole_heights, axis=-1)[:, None]
         all_stand = (sole_heights > median_height - _MAX_FOOT_DROP * standing_height).all(axis=-1)
 

@@ -234,6 +234,7 @@ class _Track(NamedTuple):
 
 
 def _simulate_leaps(body: Body, rest_angles: np.ndarray, targets: np.ndarray) -> _Track:
+    """Return how a sized body moves in several leaps, each in a simulation of its own; see `simulate_flights`."""
     model = compile_model(body)
     layout = readings.layout(model, body)
     rest_pose = pose_mechanics(body, rest_angles)

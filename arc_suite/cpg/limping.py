@@ -10,8 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import rotations
-from arc_suite.cpg.command_law import Request
+from arc_suite.cpg.command_law import Request, read_vertical
 from arc_suite.cpg.stepping import GaitTiming, Stepping, SteppingParameters, SteppingState
 from arc_suite.tasks.contract import Task
 
@@ -83,7 +82,7 @@ class Limping(Stepping):
         """Return the next state, target angles (environments, joints), rad, and their change; see `CommandLaw`."""
         if self.directed:
             return super().follow_request(state, request, observation)
-        vertical = rotations.matrix(observation["posture"][:, 1:5])[:, 2]  # the world's, in the torso's frame
+        vertical = read_vertical(observation)
         failure = find_failure(state.squared_errors)
         timing = self._linger(self.gait_timing(request, observation), failure)
 

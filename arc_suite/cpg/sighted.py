@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import rotations
 from arc_suite.cpg import footholds
-from arc_suite.cpg.command_law import CommandLaw, Request
+from arc_suite.cpg.command_law import CommandLaw, Request, read_vertical
 from arc_suite.models import foot_paths, posture
 from arc_suite.models.kinematics import Legs, path_weights, point_velocities, tilt_heights
 from arc_suite.tasks.contract import Task
@@ -110,14 +109,14 @@ class Sighted(CommandLaw):
     def follow_request(self, state: SightedState, request: Request, observation: Mapping) -> tuple:
         """Return the next state, target angles (environments, joints), rad, and their change; see `CommandLaw`."""
         parameters = self.parameters
-        torso_quaternion = observation["posture"][:, 1:5]
         state = self._add_scan(state, observation["scan"], observation["velocities"][:, :2])
         velocity = request.size * request.motion.clip(-parameters.most, parameters.most) * self.units
         measured_motion = observation["command"][:, 3:]  # units of the command
         trust = parameters.trust
         predicted_velocity = trust * velocity + (1.0 - trust) * measured_motion * self.units
         leg_phases = (request.phase[:, None] + self.phase_offsets + request.advance[:, None]) % 1.0
-        feet, shifts = self._next_feet(state, leg_phases, velocity, predicted_velocity, request.size, torso_quaternion)
+        vertical = read_vertical(observation)
+        feet, shifts = self._next_feet(state, leg_phases, velocity, predicted_velocity, request.size, vertical)
         weights = path_weights(point_velocities(velocity, feet), _SLIP_WEIGHT)
         damping = posture.IK_DAMPING * self.mechanics.height
         angles = self.legs.solve_joint_angles(state.angles, feet, weights, damping, _IK_ITERATIONS)
@@ -157,7 +156,7 @@ class Sighted(CommandLaw):
             moved=xp.concatenate([xp.zeros_like(moved[:, :1]), moved], axis=1),
         )
 
-    def _next_feet(self, state: SightedState, leg_phases, velocity, predicted_velocity, gait_size, quaternion) -> tuple:
+    def _next_feet(self, state: SightedState, leg_phases, velocity, predicted_velocity, gait_size, vertical) -> tuple:
         """Return positions (environments, legs, 3) of the soles in the next control step, m, and shifts of footholds.
 
         Args:
@@ -166,7 +165,7 @@ class Sighted(CommandLaw):
             velocity: (environments, 3) requested, m/s and rad/s.
             predicted_velocity: (environments, 3) until feet land, m/s and rad/s.
             gait_size: (environments, 1) from 0 to 1.
-            quaternion: (environments, 4) quaternion of the torso.
+            vertical: (environments, 3) the world's, in the torso's frame.
         """
         xp = leg_phases.__array_namespace__()
         duty_factor = self.duty_factor
@@ -190,7 +189,6 @@ class Sighted(CommandLaw):
         stance_ground = state.feet[..., :2] - foot_travel
         ground = xp.where(is_stance[..., None], stance_ground, swing_ground)
 
-        vertical = rotations.matrix(quaternion)[:, 2]  # the world's, in the torso's frame
         tilt = tilt_heights(vertical, self.rest_soles)
         swing_progress = ((leg_phases - duty_factor) / (1.0 - duty_factor)).clip(0.0)
         lift = gait_size * self.parameters.lift * self.mechanics.height * xp.sin(np.pi * swing_progress)

@@ -20,8 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from arc_suite import rotations
-from arc_suite.cpg.command_law import CommandLaw, Request
+from arc_suite.cpg.command_law import CommandLaw, Request, read_vertical
 from arc_suite.models import foot_paths, overlap, posture
 from arc_suite.models.kinematics import path_weights, point_velocities
 from arc_suite.models.standing import GRAVITY
@@ -179,8 +178,7 @@ class Stepping(CommandLaw):
     def follow_request(self, state: SteppingState, request: Request, observation: Mapping) -> tuple:
         """Return the next state, target angles (environments, joints), rad, and their change; see `CommandLaw`."""
         torso_height = observation["posture"][:, 0]  # m
-        torso_quaternion = observation["posture"][:, 1:5]
-        vertical = rotations.matrix(torso_quaternion)[:, 2]  # the world's, in the torso's frame
+        vertical = read_vertical(observation)
         balance_vertical = vertical
         if self.directed:
             # Balance is about the commanded attitude: it must not work against it.

@@ -256,16 +256,9 @@ def _check_parts(root: ElementTree.Element, body: Body) -> None:
 
     These are one free torso, and the joints, links, feet and standing pose of the body.
     """
-    world = root.find("worldbody")
-    torso = world[0] if world is not None and len(world) == 1 else None
-    first_joint = None if torso is None else torso.find("joint")
-    joints = [] if torso is None else list(torso.iter("joint"))
-    free_joints = [joint.get("name") for joint in joints if joint.get("type") == "free"]
-    if torso is None or torso.get("name") != "torso" or free_joints != ["root"] or first_joint.get("type") != "free":
-        _fail("expected one body in the world, named 'torso', whose first joint 'root' is the one that is free")
-
+    joint_names = [joint.get("name") for joint in _find_torso(root).iter("joint")]
     # Joints that the body has not are passive.
-    hinge_names = [joint.get("name") for joint in joints if joint.get("name") != "root"]
+    hinge_names = [name for name in joint_names if name != "root"]
     _check_names("joint", hinge_names, [*body.joint_names, *(joint.name for joint in body.held)])
     _check_names("body", [part.get("name") for part in root.iter("body")], body.part_names)
     _check_names("site", [site.get("name") for site in root.iter("site")], ("torso", *body.foot_names))
@@ -274,6 +267,17 @@ def _check_parts(root: ElementTree.Element, body: Body) -> None:
     position_count = 7 + len(hinge_names)  # the free joint has 7
     if keyframe_sizes != [position_count]:
         _fail(f"expected a keyframe 'home' of {position_count} numbers")
+
+
+def _find_torso(root: ElementTree.Element) -> ElementTree.Element:
+    """Return the torso of a source; raise SpecError for one that is not the only free body."""
+    torsos = root.findall("worldbody/*")
+    if len(torsos) == 1 and torsos[0].get("name") == "torso":
+        first_joint = torsos[0].find("joint")
+        free_joints = [joint.get("name") for joint in torsos[0].iter("joint") if joint.get("type") == "free"]
+        if free_joints == ["root"] and first_joint is not None and first_joint.get("type") == "free":
+            return torsos[0]
+    _fail("expected one body in the world, named 'torso', whose first joint 'root' is the one that is free")
 
 
 def _check_names(kind: str, names: list[str], required_names: Iterable[str]) -> None:

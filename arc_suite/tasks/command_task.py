@@ -23,6 +23,7 @@ from arc_suite.models.standing import GRAVITY
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import blocks, clock, energy, parameters, terms
 from arc_suite.tasks import readings as reading
+from arc_suite.tasks.arrows import draw_velocity
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.command import Command, Scheduled, WithLive
 from arc_suite.tasks.context import Context
@@ -49,13 +50,6 @@ COSTS = {
     "posture": -0.001,
     "transport": 0.0,
 }
-
-# R is the mean distance of the feet from their center.
-_ARROW_DISTANCE = 0.8  # of the start of the command's arrows from the torso, R
-_ARROW_RADIUS = 0.06  # R
-_ARROW_SAMPLES = np.linspace(0.0, 1.0, 9)  # points of an arrow that must lie over the ground
-_VELOCITY_COLOR = (1.0, 0.75, 0.1, 1.0)
-_TURNING_COLOR = (0.2, 0.8, 1.0, 1.0)
 
 
 class CommandTaskSettings(NamedTuple):
@@ -513,39 +507,10 @@ class CommandTask(GaitTask):
         return self.settings.ground.stream_state(memory.ground, outcome, memory.health.fell)
 
     def markers(self, memory: CommandTaskMemory, readings: Sensed) -> list[Marker]:
-        """Return arrows on the ground ahead of the torso: the desired velocity, and from its tip the turning.
-
-        The arrow of turning is the sideways velocity of a point R ahead. At the target velocity an arrow is R long.
-        """
-        reach = self.context.reach  # R, m
-        radius = _ARROW_RADIUS * reach
-        x, y, heading = memory.core.place
-        forward, left, turn = (reach * share for share in memory.core.desired)
-        ahead = np.array((math.cos(heading), math.sin(heading)))
-        leftward = np.array((-ahead[1], ahead[0]))
-        start = np.array((x, y)) + _ARROW_DISTANCE * reach * ahead
-        tip = start + forward * ahead + left * leftward
-        tip_of_turning = tip + turn * leftward
-        arrows = []
-        if (start != tip).any():
-            arrows.append(self._arrow(start, tip, _VELOCITY_COLOR))
-        if (tip != tip_of_turning).any():
-            arrows.append(self._arrow(tip, tip_of_turning, _TURNING_COLOR))
-        base = np.array((*start, self.scene.arena.height(*start)))
-        disk = Marker("cylinder", base, base + (0.0, 0.0, radius), 2.0 * radius, _VELOCITY_COLOR)
-        return [disk, *arrows, *self.settings.command.markers(self.context, memory.command)]
-
-    def _arrow(self, start: np.ndarray, end: np.ndarray, color) -> Marker:
-        """Return an arrow between two points (2,), so far above the ground that nothing between them covers it."""
-        radius = _ARROW_RADIUS * self.context.reach
-        points = start + _ARROW_SAMPLES[:, None] * (end - start)
-        ground_heights = self.scene.arena.height(*points.T)
-        chord = ground_heights[0] + _ARROW_SAMPLES * (ground_heights[-1] - ground_heights[0])  # between both ends
-        clearance = (ground_heights - chord).max()  # by which the ground rises over the chord
-        heights = chord + clearance + radius
-        first_point = np.array((*points[0], heights[0]))
-        last_point = np.array((*points[-1], heights[-1]))
-        return Marker("arrow", first_point, last_point, radius, color)
+        """Return arrows of the desired velocity, and what the command shows in addition."""
+        core = memory.core
+        arrows = draw_velocity(self.scene.arena, self.context.reach, core.place, core.desired)
+        return [*arrows, *self.settings.command.markers(self.context, memory.command)]
 
 
 def _velocity(name: str) -> tuple[Part, ...]:
