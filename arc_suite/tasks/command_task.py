@@ -210,8 +210,8 @@ class CommandTask(GaitTask):
         }
 
     @property
-    def _gait(self) -> GaitAndPose | PrescribedGait:
-        """The gait that feet are to follow: that by command, or else the prescribed one."""
+    def _gait(self) -> Any:
+        """The gait that feet are to follow: a `GaitAndPose` by command, or else the `PrescribedGait`."""
         gait_and_pose = self.settings.gait_and_pose
         return PrescribedGait(self.parameters, self.clock) if gait_and_pose is None else gait_and_pose
 

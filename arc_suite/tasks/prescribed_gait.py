@@ -1,7 +1,8 @@
 """The gait that the parameters of a task prescribe, for tasks that command neither gaits nor poses."""
 
+import dataclasses
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -12,7 +13,8 @@ from arc_suite.tasks.context import Context
 from arc_suite.tasks.parameters import Parameters
 
 
-class PrescribedGait(NamedTuple):
+@dataclasses.dataclass(frozen=True, eq=False)
+class PrescribedGait:
     """A gait that never changes, with the methods of `gait_and_pose.GaitAndPose`.
 
     It has no memory, no commands, no blocks and no bonuses of its own. Its phase follows from the tick of the clock.
@@ -26,7 +28,7 @@ class PrescribedGait(NamedTuple):
     parameters: Parameters
     clock: Clock
 
-    needs_feet = False
+    needs_feet: ClassVar[bool] = False
 
     def blocks(self, body: Body) -> dict[str, Block]:
         """Return no blocks."""
