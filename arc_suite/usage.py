@@ -4,11 +4,15 @@ A run records its usage while it learns. All environments that are open add thei
 their episodes. Demonstrators, policies and datasets add what they are. Nothing is recorded outside of runs,
 and nothing while policies are judged.
 
+An episode without a seed gets one of the run. Seeds are checked when a stream of episodes begins, when a snapshot is
+restored, and in each step, as an environment may be older than the run.
+
 Other processes and other simulators are not seen. `RunContext.count_steps` adds their steps.
 """
 
 import contextlib
 import contextvars
+import os
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
@@ -19,6 +23,8 @@ DEMONSTRATOR = "a demonstrator"
 POLICY = "a policy"
 UNKNOWN = "unknown"
 SOURCES = (NOTHING, PRIOR_DATA, DEMONSTRATOR, POLICY, UNKNOWN)
+
+UNKNOWN_SEED = -1  # Gymnasium's sign for a stream of unknown seed
 
 STEP_COUNTS = ("environment_steps", "steps_by_learner")  # attributes of `Usage`, and their names in checkpoints
 
@@ -60,6 +66,9 @@ class Usage:
         self._source = source
         self._seeds = seeds
         self._runs = runs
+        self._known_seeds: set[int] = set()  # that have passed the check
+        self._drawn_seeds = 0
+        self._process = os.getpid()
 
     @property
     def steps(self) -> int:
@@ -75,17 +84,38 @@ class Usage:
         """Add steps of environments."""
         self.environment_steps += steps // self._runs
 
-    def check_seeds(self, seeds: Iterable[int | None]) -> None:
-        """Raise ValueError for the seed of an episode that the run may not play."""
+    def check_seeds(self, seeds: Iterable[int]) -> None:
+        """Raise ValueError for the seed of an episode that the run may not play, and for an unknown one."""
         if not self._seeds:
             return
-        for seed in seeds:
-            if seed is not None and not any(seed in allowed_seeds for allowed_seeds in self._seeds):
+        for seed in sorted(set(seeds) - self._known_seeds):
+            if not any(seed in allowed_seeds for allowed_seeds in self._seeds):
                 ranges = ", ".join(f"{allowed.start} to {allowed.stop - 1}" for allowed in self._seeds)
-                raise ValueError(
-                    f"algorithm {self._name}: seed {seed} is of an episode of others; this run learns in those of "
-                    f"seeds {ranges}"
-                )
+                fault = f"seed {seed} is of an episode of others"
+                if seed == UNKNOWN_SEED:
+                    fault = "an episode has no known seed, so give reset one"
+                raise ValueError(f"algorithm {self._name}: {fault}; this run learns in those of seeds {ranges}")
+            self._known_seeds.add(seed)
+
+    def draw_seeds(self, count: int) -> list[int]:
+        """Return seeds of the run for streams of episodes without a seed; none if the run may play all episodes.
+
+        They count down from the last seed, as learners count up from the first. A run that resumes draws the same.
+
+        Raises:
+            ValueError: another process draws, whose seeds the run does not know.
+        """
+        if not self._seeds:
+            return []
+        allowed_seeds = self._seeds[0]
+        if os.getpid() != self._process:
+            raise ValueError(
+                f"algorithm {self._name}: an environment of another process begins without a seed; give reset "
+                f"a seed from {allowed_seeds.start} to {allowed_seeds.stop - 1}"
+            )
+        numbers = range(self._drawn_seeds, self._drawn_seeds + count)
+        self._drawn_seeds += count
+        return [allowed_seeds[-1 - number % len(allowed_seeds)] for number in numbers]
 
     def add_source(self, source: str) -> None:
         """Add a source.
@@ -101,6 +131,7 @@ class Usage:
 
 
 recording: list[Usage] = []  # of the runs that learn in this process; empty outside of runs
+_learners: list[str] = []  # names of algorithms whose code runs now
 _is_paused = contextvars.ContextVar("is_paused", default=False)  # in this thread
 
 
@@ -115,8 +146,24 @@ def record(usage: Usage) -> Iterator[Usage]:
 
 
 @contextlib.contextmanager
+def run_learner(algorithm: str) -> Iterator[None]:
+    """Refuse pauses within the context, in all threads: the code of a learner runs."""
+    _learners.append(algorithm)
+    try:
+        yield
+    finally:
+        _learners.remove(algorithm)
+
+
+@contextlib.contextmanager
 def pause() -> Iterator[None]:
-    """Record nothing within the context, in this thread: a policy is judged."""
+    """Record nothing within the context, in this thread: a policy is judged.
+
+    Raises:
+        ValueError: a learner pauses, whose usage is to be recorded.
+    """
+    if _learners:
+        raise ValueError(f"algorithm {_learners[-1]}: pauses the record of its usage; only judges do, between slices")
     token = _is_paused.set(True)
     try:
         yield
@@ -136,14 +183,27 @@ def count_steps_by_learner(steps: int) -> None:
         usage.steps_by_learner += steps
 
 
-def check_seeds(seeds: Iterable[int | None]) -> None:
-    """Check the seeds of streams of episodes, None for unknown ones.
+def check_seeds(seeds: Iterable[int]) -> None:
+    """Check the seeds of streams of episodes.
 
     Raises:
-        ValueError: a run learns, and may not play the episodes of a seed.
+        ValueError: a run learns, and may not play the episodes of a seed, or the seed is unknown.
     """
     for usage in _active_usages():
         usage.check_seeds(seeds)
+
+
+def draw_seeds(count: int) -> list[int]:
+    """Return seeds of the run that learns for streams of episodes without a seed; none without such a run.
+
+    Raises:
+        ValueError: another process than that of the run draws.
+    """
+    for usage in _active_usages():
+        seeds = usage.draw_seeds(count)
+        if seeds:
+            return seeds
+    return []
 
 
 def add_source(source: str) -> None:

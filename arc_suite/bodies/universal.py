@@ -87,6 +87,7 @@ class Universal:
     @property
     def graph(self) -> Graph:
         """The graph of actions (num_envs, joints) for observations (num_envs, size) of the task."""
+        self.network.note_use()
         if self.task.actions == "position":
             return self._positions
         return traced(self._trace_torques, self.task.size)
@@ -98,8 +99,10 @@ class Universal:
         """Return the actions (num_envs, joints) of a control step; see `Policy.act`.
 
         Raises:
-            ValueError: an observation of another body, or without a block of the task.
+            ValueError: an observation of another body, or without a block of the task; or a run learns that declares no
+                policy as its source.
         """
+        self.network.note_use()
         joint_count = len(self.reach)
         part_count = len(self.task.scene.body.part_names)
         blocks = read_blocks(observation, self.task.sizes, joint_count, part_count)
@@ -134,4 +137,4 @@ def for_body(trained: Network, setup: Setup) -> Network:
         ValueError: as `Universal`.
     """
     policy = Universal(trained, setup.definition)
-    return Network(policy.graph, setup, dict(policy.task.sizes))
+    return type(trained)(policy.graph, setup, dict(policy.task.sizes))  # a stored network remains one

@@ -111,7 +111,12 @@ class Dataset:
 
     @contextlib.contextmanager
     def reading(self):
-        """Yield the open HDF5 file. In this context, an error of a damaged file becomes a ValueError of one line."""
+        """Yield the open HDF5 file. In this context, an error of a damaged file becomes a ValueError of one line.
+
+        Raises:
+            ValueError: a run learns that declares no prior data as its source.
+        """
+        usage.add_source(usage.PRIOR_DATA)
         path = self.path / "data" / MAIN
         with explain_damage(self.id, path), h5py.File(files.plain(path), "r") as file:
             yield file

@@ -140,6 +140,8 @@ class Environment(KnownAttributes, control.Environment):
 
         A fall terminates the episode, in its last possible step, too: its discount is 0.
         """
+        if usage.recording and not self._reset_next_step:
+            usage.check_seeds([self.task.stream_seed])
         timestep = super().step(action)
         if usage.recording and not timestep.first():
             usage.count_steps(1)
@@ -202,7 +204,8 @@ class Environment(KnownAttributes, control.Environment):
         """Continue, bit-exactly, from the snapshot of an environment of the same task.
 
         Raises:
-            ValueError: an array is missing or does not fit; the state has not changed.
+            ValueError: an array is missing or does not fit, or a seed that the run that learns may not play; the state
+                has not changed.
         """
         self.physics.check_process()
         run = self.task  # dm_control calls a `TaskRun` the task
@@ -212,6 +215,7 @@ class Environment(KnownAttributes, control.Environment):
         state, (present_tasks, next_tasks) = snapshots.from_arrays(
             self._state(), run.definition, check_simulations, arrays, [run.opened], self.task_kwargs
         )
+        usage.check_seeds(state.environment_arrays["stream_seeds"].tolist())
         self.physics.restore(state.simulations)
         run.restore(state, present_tasks[0], next_tasks[0])
         self._step_count = int(state.environment_arrays["steps"][0])
@@ -228,14 +232,18 @@ class Environment(KnownAttributes, control.Environment):
 
         Args:
             seed: starts a new stream of random numbers with this episode; None
-                for the next episode of the present stream.
+                for the next episode of the present stream. While a run learns, a stream of unknown seed ends, and a
+                new one begins with a seed of the run.
 
         Raises:
             ValueError: the seed is not valid.
             RuntimeError: another thread is at work in the environment.
         """
         if seed is not None:
-            self.task.random = _begin_stream(seed)
+            self.task.begin_stream(seed)
+        elif usage.recording and self.task.stream_seed == usage.UNKNOWN_SEED:
+            for drawn_seed in usage.draw_seeds(1):
+                self.task.begin_stream(drawn_seed)
         return super().reset()
 
     def command(self, name: str, value: ArrayLike | str | None) -> None:
@@ -297,6 +305,8 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         "_motors": "_action_shape",
     }
 
+    _stream_seed: int = usage.UNKNOWN_SEED  # in pickles of earlier versions, which do not hold it
+
     def __init__(self, task: Task, random=None, on_divergence: str = "raise", flat: bool = False):
         """Prepare to run.
 
@@ -310,8 +320,6 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         Raises:
             ValueError: an unknown `on_divergence`, or a seed that is not valid.
         """
-        if not isinstance(random, np.random.RandomState):
-            random = _begin_stream(random)
         self.definition = task
         self.opened = task
         self._next_task = task
@@ -321,7 +329,10 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         self._stream = None  # state of the stream with which the present episode has started
         self._commands = LiveCommands()
         self.visualize_reward = False
-        self.random = random
+        if isinstance(random, np.random.RandomState):
+            self.random = random
+        else:
+            self.begin_stream(random)
         self._on_divergence = checks.name(on_divergence, ("raise", "truncate"), "on_divergence")
         self._flat = flat
         self._is_starting = False  # True between a reset and its observation
@@ -335,7 +346,30 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
 
     @random.setter
     def random(self, value: np.random.RandomState):
-        self._random = value
+        usage.check_seeds([usage.UNKNOWN_SEED])
+        self._set_stream(value, usage.UNKNOWN_SEED)
+
+    @property
+    def stream_seed(self) -> int:
+        """The seed of the stream of episodes; -1 if it is unknown."""
+        return self._stream_seed
+
+    def begin_stream(self, seed: int | None) -> None:
+        """Begin a new stream of episodes with the next one; of a random seed for None.
+
+        Raises:
+            ValueError: a seed that is not valid, or one that the run that learns may not play.
+        """
+        if seed is None:
+            self._set_stream(np.random.RandomState(), usage.UNKNOWN_SEED)
+            return
+        valid_seed = checks.seed(seed)
+        usage.check_seeds([valid_seed])
+        self._set_stream(np.random.RandomState(valid_seed), valid_seed)
+
+    def _set_stream(self, random: np.random.RandomState, seed: int) -> None:
+        self._random = random
+        self._stream_seed = seed
         self._stream_begins = True  # with the next episode
 
     @property
@@ -534,7 +568,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         task = self.definition
         observation = task.vector(task.observe(self._now.memory, task.read(physics.data.ptr)), np.float32)
         environment_values = {
-            "stream_seeds": -1,  # unknown
+            "stream_seeds": self._stream_seed,
             "streams_begin": self._stream_begins,
             "steps": steps,
             "ended": ended,
@@ -564,6 +598,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         self._present_changes = present_texts[0]
         self.next_changes = next_texts[0]
         self._random.set_state(state.randoms[0])
+        self._stream_seed = int(state.environment_arrays["stream_seeds"][0])
         self._stream_begins = bool(state.environment_arrays["streams_begin"][0])
 
     def _consume_commands(self) -> None:
@@ -593,16 +628,3 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         self._now.memory = self.definition.begin(self._now.memory, readings)
         self._now.readings = None
         return readings
-
-
-def _begin_stream(seed: int | None) -> np.random.RandomState:
-    """Return the generator of a stream of episodes; of a random one for None.
-
-    Raises:
-        ValueError: a seed that is not valid, or one that the run that learns may not play.
-    """
-    if seed is None:
-        return np.random.RandomState()
-    valid_seed = checks.seed(seed)
-    usage.check_seeds([valid_seed])
-    return np.random.RandomState(valid_seed)

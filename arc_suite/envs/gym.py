@@ -12,7 +12,7 @@ import numpy as np
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from numpy.typing import ArrayLike
 
-from arc_suite import checks, versions
+from arc_suite import checks, usage, versions
 from arc_suite.envs.calls import KnownAttributes, one_thread_at_a_time
 from arc_suite.envs.dm import TaskRun, load
 from arc_suite.envs.prepare import checked_limit, refuse_arguments
@@ -52,7 +52,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
     observation_space: gymnasium.spaces.Box
     action_space: gymnasium.spaces.Box
 
-    _np_random_seed = -1  # until a seed is given: Gymnasium's sign for a stream of unknown seed
+    _np_random_seed = usage.UNKNOWN_SEED  # until a seed is given
 
     _FORMER_NAMES = {  # in pickles of earlier versions
         **KnownAttributes._FORMER_NAMES,
@@ -142,7 +142,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
     @np_random.setter
     def np_random(self, value: np.random.Generator):
         self._env.task.random = np.random.RandomState(value.bit_generator)
-        self._np_random_seed = -1
+        self._np_random_seed = usage.UNKNOWN_SEED
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -168,6 +168,8 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
             raise ValueError(f"unknown option of reset {name}: one environment has none; vector ones have reset_mask")
         observation = self._env.reset(seed).observation
         gymnasium.Env.reset(self, seed=None if seed is None else checks.seed(seed))
+        if self._np_random_seed == usage.UNKNOWN_SEED:  # a run that learns may have begun a stream
+            self._np_random_seed = self._env.task.stream_seed
         self._episode_is_running = True
         self._show()
         return _to_vector(observation), self._privileged_info()

@@ -203,7 +203,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self._next_changes = np.full(self.num_envs, "{}", object)
         self._randoms = [np.random.RandomState() for _ in range(self.num_envs)]
         self._streams = [task.first() for task in self._tasks]  # states with which the present episodes have started
-        self._stream_seeds = np.full(self.num_envs, -1)  # Gymnasium's sign for a stream of unknown seed
+        self._stream_seeds = np.full(self.num_envs, usage.UNKNOWN_SEED)
         self._streams_begin = np.ones(self.num_envs, bool)  # environments whose next episode is the first of its stream
         if seed is not None:
             self._begin_streams(self._checked_seeds(seed), np.ones(self.num_envs, bool))
@@ -235,7 +235,8 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
 
         Args:
             seed: s to seed environment i with s + i, one seed for each environment, or None to continue their
-                streams of random numbers; single seeds may be None, too.
+                streams of random numbers; single seeds may be None, too. While a run learns, streams of unknown seeds
+                end, and new ones begin with seeds of the run.
             options: `reset_mask`, (num_envs,) booleans, selects the environments that get seeds and start.
 
         Returns:
@@ -252,6 +253,8 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
             raise ResetNeeded("cannot reset some environments: reset all of them first")
         if seed is not None:
             self._begin_streams(self._checked_seeds(seed), mask)
+        if usage.recording:
+            self._begin_unknown_streams(mask)
         self._consume_commands()
         self._start_episodes(mask, self._observation)
         return self._observation.copy(), self._privileged_info(mask)
@@ -287,9 +290,10 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
 
         memory_with_action, inputs = task.before(earlier_memory, checked_action(actions, self.action_space.shape))
         self._write_inputs(inputs, is_stepping)
-        has_diverged = self.batch.step(task.scene.substeps, is_stepping)
         if usage.recording:
+            usage.check_seeds(self._stream_seeds[is_stepping].tolist())
             usage.count_steps(int(np.count_nonzero(is_stepping)))
+        has_diverged = self.batch.step(task.scene.substeps, is_stepping)
         readings = task.read(self.batch.data)
         memory = trees.where(is_stepping, task.after(memory_with_action, readings), earlier_memory)
         self._memory = memory
@@ -533,14 +537,19 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         """Return the state of a snapshot, and the tasks of its episodes and of the next ones.
 
         If no episode has begun yet, episodes begin, so that there is a state to compare with.
+
+        Raises:
+            ValueError: an array that does not fit, or a seed that the run that learns may not play.
         """
         if self._memory is None:
             self._start_episodes(np.ones(self.num_envs, bool), self._observation)
         self._consume_commands()
         _, _, task_kwargs = self.arguments
-        return snapshots.from_arrays(
+        state, tasks = snapshots.from_arrays(
             self._state(), self._task, self.batch.check_snapshot, arrays, self._opened_tasks, task_kwargs
         )
+        usage.check_seeds(state.environment_arrays["stream_seeds"].tolist())
+        return state, tasks
 
     def _restore_state(self, state: snapshots.State, tasks: list[list[Task]]) -> None:
         """Continue from a state, given the tasks of its episodes and of the next ones."""
@@ -712,13 +721,23 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
 
     def _begin_streams(self, seeds: Sequence[int | None], mask: np.ndarray) -> None:
         """Start new streams of random numbers in some environments (num_envs,), except those whose seed is None."""
-        indices = np.flatnonzero(mask).tolist()
-        usage.check_seeds(seeds[index] for index in indices)
-        for index in indices:
-            if seeds[index] is not None:
-                self._randoms[index] = np.random.RandomState(seeds[index])
-                self._stream_seeds[index] = seeds[index]
-                self._streams_begin[index] = True
+        seeds_by_index = {index: seeds[index] for index in np.flatnonzero(mask).tolist() if seeds[index] is not None}
+        usage.check_seeds(seeds_by_index.values())
+        for index, seed in seeds_by_index.items():
+            self._randoms[index] = np.random.RandomState(seed)
+            self._stream_seeds[index] = seed
+            self._streams_begin[index] = True
+
+    def _begin_unknown_streams(self, mask: np.ndarray) -> None:
+        """Start streams of the run that learns where some environments (num_envs,) have streams of unknown seeds."""
+        is_unknown = mask & (self._stream_seeds == usage.UNKNOWN_SEED)
+        if not is_unknown.any():
+            return
+        drawn_seeds = usage.draw_seeds(int(np.count_nonzero(is_unknown)))
+        if drawn_seeds:
+            seeds = np.full(self.num_envs, None, object)
+            seeds[is_unknown] = drawn_seeds
+            self._begin_streams(seeds.tolist(), is_unknown)
 
 
 def _checked_autoreset_mode(autoreset_mode: str | AutoresetMode) -> AutoresetMode:

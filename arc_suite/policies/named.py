@@ -7,13 +7,13 @@ import os
 import pkgutil
 import sys
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from arc_suite import checks, files, registry, seed_ranges
+from arc_suite import checks, files, registry, seed_ranges, usage
 from arc_suite.cpg import Demonstrator, suited_preset
 from arc_suite.cpg.selection import check_preset_name, preset_names
 from arc_suite.envs.prepare import prepare_task
@@ -446,6 +446,7 @@ def _check_joints(path: Path, joints: int, body: Body) -> None:
 
 
 def _from_function(function: FunctionName, body: Body, num_envs: int) -> Policy:
+    usage.add_source(usage.POLICY)
     path = function.text
     resolve = _resolve_in_file if function.is_in_file else pkgutil.resolve_name
     factory = checks.import_object(path, "policy", resolve)
@@ -454,7 +455,15 @@ def _from_function(function: FunctionName, body: Body, num_envs: int) -> Policy:
     hints.check_takes_robot(path, factory)
     make = _add_check(path, factory, body.name if is_robot(body) else body)
     make()  # raises an error at once if the function does not fit
-    return Individuals(make, num_envs, len(body.joint_names), f"policy {checks.preview(path)}")
+    return _NamedFunctions(make, num_envs, len(body.joint_names), f"policy {checks.preview(path)}")
+
+
+class _NamedFunctions(Individuals):
+    """The functions that a name leads to. A run that acts by them uses a policy."""
+
+    def act(self, observation: Mapping[str, np.ndarray], rewards: np.ndarray) -> np.ndarray:
+        usage.add_source(usage.POLICY)
+        return super().act(observation, rewards)
 
 
 def _resolve_in_file(path: str) -> Any:

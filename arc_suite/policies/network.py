@@ -68,6 +68,9 @@ class Network(NamedTuple):
         """Return actions (num_envs, joints) float32 for flat observations (num_envs, size)."""
         return self.graph(observations.astype(np.float32, copy=False))
 
+    def note_use(self) -> None:
+        """Do nothing, as a network that was made in memory is the learner's; `StoredNetwork` adds its source."""
+
     # The protocol of acting.
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
@@ -100,6 +103,24 @@ class Network(NamedTuple):
             )
         flat = np.concatenate([observation[name] for name in self.blocks], axis=-1, dtype=np.float32)
         return self.actions(flat).astype(float)
+
+
+class StoredNetwork(Network):
+    """A network from a file. A run that acts by it, or reads its graph, uses a policy."""
+
+    @property
+    def graph(self) -> Graph:
+        """The graph; see `Network`."""
+        self.note_use()
+        return self[0]
+
+    def note_use(self) -> None:
+        """Add a policy to the sources of the run that learns.
+
+        Raises:
+            ValueError: the run declares no policy as its source.
+        """
+        usage.add_source(usage.POLICY)
 
 
 def save(path: str | os.PathLike[str], network: Network) -> None:
@@ -177,7 +198,7 @@ def _read(path: Path) -> Network:
     physics_sha256 = record.get(PHYSICS)
     if physics_sha256 is not None and not isinstance(physics_sha256, str):
         raise ValueError(f"expected {PHYSICS} to be a str, got {checks.preview(physics_sha256)}")
-    return Network(graph, setup, blocks, seed_ranges.from_json(record.get("training_seeds")), physics_sha256)
+    return StoredNetwork(graph, setup, blocks, seed_ranges.from_json(record.get("training_seeds")), physics_sha256)
 
 
 def checkpoint_files(folder: Path) -> list[Path]:

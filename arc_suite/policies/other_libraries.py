@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import NamedTuple, Protocol, cast
 
-from arc_suite import registry
+from arc_suite import registry, usage
 from arc_suite.envs.setup import Setup
 from arc_suite.policies.network import Network
 from arc_suite.policies.protocol import Policy
@@ -83,7 +83,12 @@ class PolicyFile(NamedTuple):
         return self.reader.digest(self.path, self.further)
 
     def load(self) -> LoadedPolicy:
-        """Return its policy."""
+        """Return its policy.
+
+        Raises:
+            ValueError: a damaged file, or a run learns that declares no policy as its source.
+        """
+        usage.add_source(usage.POLICY)
         return self.reader.load(self.path, self.further)
 
 

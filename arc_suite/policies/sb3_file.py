@@ -12,9 +12,9 @@ import torch
 from stable_baselines3.common.save_util import load_from_pkl, load_from_zip_file
 from stable_baselines3.common.vec_env import VecNormalize
 
-from arc_suite import checks
+from arc_suite import checks, usage
 from arc_suite.envs.setup import Setup
-from arc_suite.policies.network import Network
+from arc_suite.policies.network import Network, StoredNetwork
 from arc_suite.policies.tracing import Traced, traced
 
 # Class of a PyTorch module -> function that adds the module's node to a graph, given the inputs and the module.
@@ -86,7 +86,7 @@ class Saved:
         if self._size != (task.size,):
             raise ValueError(f"policy {self._path}: expected observations ({task.size},), got {self._size}")
         try:
-            network = Network(traced(self._trace, task.size), setup, task.sizes)
+            network = StoredNetwork(traced(self._trace, task.size), setup, task.sizes)
         except (KeyError, AttributeError, TypeError) as error:
             raise ValueError(f"policy {self._path}: expected a perceptron, got {checks.quote(error)}") from None
         samples = np.random.default_rng(0).standard_normal((8, *self._size), np.float32)
@@ -105,6 +105,7 @@ class Saved:
         return x.node("Tanh") if self._policy.squash_output else x.clip(-1.0, 1.0)
 
     def _actions(self, observations: np.ndarray) -> np.ndarray:
+        usage.add_source(usage.POLICY)
         if self._statistics is not None:
             observations = self._statistics.normalize_obs(observations)
         with torch.no_grad():

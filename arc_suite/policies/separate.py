@@ -24,7 +24,7 @@ from typing import IO
 
 import numpy as np
 
-from arc_suite import checks, registry
+from arc_suite import checks, registry, usage
 
 MAX_START = 300.0  # s until a module is imported and has made its first function
 MAX_STEP = 60.0  # s until the answer to a reset or an act
@@ -63,8 +63,9 @@ class Separate:
             max_step: time until the answer to a reset or an act, s; a later one is an error.
 
         Raises:
-            ValueError: the module does not fit, dies or hangs.
+            ValueError: the module does not fit, dies or hangs; or a run learns that declares no policy as its source.
         """
+        usage.add_source(usage.POLICY)
         self._name = name
         self._num_envs = num_envs
         self._sizes = dict(sizes)
@@ -98,8 +99,10 @@ class Separate:
         """Return the actions (num_envs, joints) of a control step; see `Policy.act`.
 
         Raises:
-            ValueError: an action that is not finite or of another shape, an error of the module, or its end.
+            ValueError: an action that is not finite or of another shape, an error of the module, or its end; or a run
+                learns that declares no policy as its source.
         """
+        usage.add_source(usage.POLICY)
         sizes = {name: block.shape[-1] for name, block in observation.items()}
         if sizes != self._sizes:
             raise ValueError(f"{self._name}: expected blocks {self._sizes}, got {sizes}")

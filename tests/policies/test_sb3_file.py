@@ -8,8 +8,10 @@ import programs
 import pytest
 
 import arc_suite
-from arc_suite import evaluation, policies
+from arc_suite import evaluation, policies, usage
+from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
+from arc_suite.usage import Usage
 
 UNKNOWN = "does not hold the robot and task that it was trained for; train in arc_suite.envs.sb3.VecEnv"
 
@@ -44,6 +46,16 @@ def test_in_a_batch_it_does_the_same(saved):
     envs = VectorEnv("tick", "walk", 3, 1, "Disabled", task_kwargs=task)
     alone = evaluation.episodes(arc_suite.load("tick", "walk", task), policy, range(3))
     assert evaluation.episodes_in_batch(envs, policy, range(3)) == alone
+
+
+def test_a_run_that_uses_a_zip_uses_a_policy(saved):
+    name, observation = str(saved[0] / "PPO.zip"), arc_suite.load("tick", "walk").reset(0)
+    made, network = policies.policy(name, "tick"), policies.policy(name, "tick").network(Setup.of("tick", "walk"))
+    uses = (lambda: policies.policy(name, "tick"), lambda: policies.alone(made)(observation), lambda: network.graph)
+    for use in uses:
+        with usage.record(Usage("mine")) as used:
+            use()
+        assert used.sources == {usage.POLICY}
 
 
 def test_errors_are_one_line(saved, tmp_path):

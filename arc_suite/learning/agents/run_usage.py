@@ -8,6 +8,10 @@ from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.run_folder import RunFolder
 from arc_suite.usage import STEP_COUNTS, Usage
 
+# Complete slices without a new step after which a run ends. A slice takes seconds, and none is complete without having
+# learned from a new step, so that no learner that counts its steps comes near.
+MAX_STALLED_SLICES = 1000
+
 
 def begin(configuration: Configuration, run_files: RunFolder, run_seeds: Sequence[int]) -> Usage:
     """Return what a run has used until its checkpoint.
@@ -44,3 +48,23 @@ def check_steps(usage: Usage, configuration: Configuration) -> None:
             f"algorithm {configuration.algorithm}: declares acts=False, and has made {usage.environment_steps} "
             "environment steps; declare acts=True, so that these are the run's steps"
         )
+
+
+class StepWatch:
+    """Notices a learner that counts no steps, whose run would never end."""
+
+    def __init__(self, algorithm: str):
+        """Begin before the first slice; the name of the algorithm is for errors."""
+        self._algorithm = algorithm
+        self._step = -1  # of the latest complete slice
+        self._slices = 0  # complete ones since then without a new step
+
+    def check(self, step: int) -> None:
+        """Raise ValueError at a complete slice of a learner that has stayed at a step for too many slices."""
+        self._slices = self._slices + 1 if step == self._step else 0
+        self._step = step
+        if self._slices >= MAX_STALLED_SLICES:
+            raise ValueError(
+                f"algorithm {self._algorithm}: {self._slices} slices have counted no step after step {step}; "
+                "count what the suite does not see by context.count_steps, or yield is_complete=False before a step"
+            )

@@ -5,9 +5,22 @@ from typing import Any
 
 import numpy as np
 
-from arc_suite import checks
-from arc_suite.learning.agents.learner import Slice
+from arc_suite import checks, usage
+from arc_suite.learning.agents.configuration import Configuration
+from arc_suite.learning.agents.learner import RunContext, Slice
 from arc_suite.policies.graph import Graph
+
+
+def begin_learning(configuration: Configuration, context: RunContext) -> Any:
+    """Call the learner of a run, and return its generator.
+
+    Raises:
+        ValueError: it returns none.
+    """
+    definition = configuration.definition
+    with usage.run_learner(configuration.algorithm):
+        slices = definition.learn(definition.hyperparameters, context)
+    return check_generator(configuration.algorithm, slices)
 
 
 def check_generator(algorithm: str, slices: Any) -> Any:
@@ -39,7 +52,8 @@ def next_slice(algorithm: str, slices: Iterator[Any], step: int, steps: int) -> 
     Raises:
         ValueError: the learner has ended, or yields something else.
     """
-    learned_slice = next(slices, None)
+    with usage.run_learner(algorithm):
+        learned_slice = next(slices, None)
     learner_name = f"algorithm {algorithm}: learn"
     if learned_slice is None:
         raise ValueError(f"{learner_name}: expected slices until step {steps}, got no more after step {step}")

@@ -60,16 +60,11 @@ def train(
     """
     if minutes is not None:
         checks.number("minutes", minutes, 0.0)
-    algorithm = configuration.definition
     with (
         _record(
             configuration, folder, threads, configuration.learns_on_device, [configuration.seed], on_metrics
         ) as recorder,
-        contextlib.closing(
-            slices.check_generator(
-                configuration.algorithm, algorithm.learn(algorithm.hyperparameters, recorder.context)
-            )
-        ) as learned_slices,
+        contextlib.closing(slices.begin_learning(configuration, recorder.context)) as learned_slices,
         recorder.open_bar(progress),
         _report_flaw_of_task(recorder.context.training),
     ):
@@ -126,7 +121,7 @@ def train_in_one_program(
             stack.enter_context(recorder.open_bar(progress))
         stack.enter_context(_report_flaw_of_task(contexts[0].training))
         while not all(recorder.finished for recorder in recorders):
-            with _report_damage(folders):
+            with _report_damage(folders), usage.run_learner(configurations[0].algorithm):
                 next_slices = next(all_slices)
             new_slices = [
                 (recorder, learned_slice)
@@ -195,6 +190,7 @@ class _Recorder:
         # How far the run has come, which its folder keeps with a checkpoint.
         self._progress = {"evaluated": 0, "pending": [], "wall": 0.0, "cpu": 0.0} | run_files.progress
         self.usage = run_usage.begin(configuration, run_files, run_seeds)
+        self._step_watch = run_usage.StepWatch(configuration.algorithm)
         self._policy_step = self._progress["evaluated"]  # of the latest policy whose evaluation has begun
         self._is_policy_new = False  # whether the latest slice has a policy to evaluate
         # Where the clocks stood when the run began, if it had never stopped.
@@ -229,12 +225,15 @@ class _Recorder:
         """Write the line of a slice, and begin the evaluation of its policy if it is due.
 
         Raises:
-            ValueError: an algorithm that does not act, by its definition, has made environment steps.
+            ValueError: an algorithm that does not act, by its definition, has made environment steps, or a learner has
+                counted no step in many slices.
             Diverged: a metric or an array of the slice is not finite.
         """
         step = self.usage.steps
         metrics = learned_slice.metrics
         run_usage.check_steps(self.usage, self._configuration)
+        if learned_slice.is_complete:
+            self._step_watch.check(step)
         _check_finite(learned_slice, step, self.folder)
         self._bar.update(step - self._bar.n)
         if metrics is not None:
