@@ -29,7 +29,10 @@ def assemble(body: Body, arena: Arena | None = FLAT, decorated: bool = False) ->
     if body.source:
         raise ValueError(f"{body.name} was imported: `models.text` has its MJCF")
     sized_body = sizing.size_body(body)
-    root = builder.build(sized_body)
+    framed_points = None
+    if decorated:
+        framed_points = np.concatenate([outline(sized_body), visuals.outline_ornaments(sized_body)])
+    root = builder.build(sized_body, framed_points)
     if arena is None:
         root.find("joint", "root").remove()
         root.option.remove()
@@ -37,15 +40,7 @@ def assemble(body: Body, arena: Arena | None = FLAT, decorated: bool = False) ->
         arena.add_to(root, **builder.contact(sized_body.simulation))
     if decorated:
         visuals.decorate(root, sized_body)
-        _frame_ornaments(root, sized_body)
     return root
-
-
-def _frame_ornaments(root: mjcf.RootElement, body: Body) -> None:
-    """Move the cameras that frame a body so that they see its ornaments, too."""
-    points = np.concatenate([outline(body), visuals.outline_ornaments(body)])
-    for name, camera in builder.cameras(body, points).items():
-        root.find("camera", name).set_attributes(**camera)
 
 
 def text(body: Body, arena: Arena | None = FLAT, decorated: bool = False) -> str:

@@ -52,7 +52,7 @@ class Element(NamedTuple):
     attributes: dict[str, Any]
 
 
-def build(body: Body) -> mjcf.RootElement:
+def build(body: Body, framed_points: np.ndarray | None = None) -> mjcf.RootElement:
     """Assemble the body in an empty world: no floor, no decorations.
 
     The legs are written into the one root, since PyMJCF's `attach` would add a body for each and so change the
@@ -60,6 +60,7 @@ def build(body: Body) -> mjcf.RootElement:
 
     Args:
         body: the spec, with nothing left to be sized.
+        framed_points: see `cameras`.
 
     Returns:
         The model, in radians, with the torso as a free body at its standing height.
@@ -69,7 +70,7 @@ def build(body: Body) -> mjcf.RootElement:
     root.option.set_attributes(**options(body))
     root.option.flag.set_attributes(**FLAGS)
     parents = {WORLD: root.worldbody, ACTUATOR: root.actuator, SENSOR: root.sensor}
-    for tag, parent, attributes in elements(body):
+    for tag, parent, attributes in elements(body, framed_points):
         element = parents[parent].add(tag, **attributes)
         if tag == "body":
             parents[attributes["name"]] = element
@@ -86,13 +87,14 @@ def options(body: Body) -> dict[str, Any]:
     }
 
 
-def elements(body: Body) -> list[Element]:
+def elements(body: Body, framed_points: np.ndarray | None = None) -> list[Element]:
     """Return all elements of a body in an empty world, parents first.
 
     Every element is named: bodies, geoms and sites after the part, joints and motors `<leg>_<joint>`.
 
     Args:
         body: the spec, with nothing left to be sized.
+        framed_points: see `cameras`.
     """
     body_elements = parts(body, body.simulation)
     for name, joint in zip(body.joint_names, body.joints, strict=True):
@@ -100,7 +102,7 @@ def elements(body: Body) -> list[Element]:
     for name, joint in zip(body.joint_names, body.joints, strict=True):
         if joint.motor.drag is not None:
             body_elements.append(_drag(name, joint.motor.drag))
-    for name, camera in cameras(body).items():
+    for name, camera in cameras(body, framed_points).items():
         body_elements.append(Element("camera", "torso", {"name": name, "mode": "trackcom", **camera}))
     body_elements.append(Element("camera", "torso", {"name": EYE, "mode": "fixed", **eye(body)}))
     body_elements.append(_site("torso", radius=0.01))
@@ -247,19 +249,19 @@ def _site(part: str, radius: float) -> Element:
     return Element("site", part, {"name": part, "size": (radius,), "group": _SITE_GROUP})
 
 
-def cameras(body: Body, points: np.ndarray | None = None) -> dict[str, dict]:
+def cameras(body: Body, framed_points: np.ndarray | None = None) -> dict[str, dict]:
     """Return cameras that ride along by name: `tracking`, of the spec, `portrait` and `profile`, which frame the body.
 
     Args:
         body: the spec.
-        points: (n, 3) in the torso's frame that they show; None for those of `outline`.
+        framed_points: (n, 3) points in the torso's frame that they show, m; None for those of `outline`.
     """
-    if points is None:
-        points = outline(body)
+    if framed_points is None:
+        framed_points = outline(body)
     tracking_camera = {"pos": body.camera.position, "xyaxes": body.camera.xyaxes}
     camera_of_name: dict[str, dict[str, Any]] = {"tracking": tracking_camera}
     for name, (azimuth, elevation) in _VIEWS.items():
-        camera_of_name[name] = {"fovy": _VIEW_FOVY, **_framing_pose(points, azimuth, elevation)}
+        camera_of_name[name] = {"fovy": _VIEW_FOVY, **_framing_pose(framed_points, azimuth, elevation)}
     return camera_of_name
 
 

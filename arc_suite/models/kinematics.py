@@ -100,6 +100,15 @@ class Legs(NamedTuple):
         """Return values (..., legs, links) as (..., joints)."""
         return values[..., self.has_joint]
 
+    def sole_positions(self, angles) -> np.ndarray:
+        """Return the positions (..., legs, 3) of soles in the torso's frame, m, at angles (..., legs, links), rad."""
+        return self.foot_centers(angles) - self.radii[:, None] * _VERTICAL
+
+    def foot_centers(self, angles) -> np.ndarray:
+        """Return the positions (..., legs, 3) of the centers of feet in the torso's frame, m; see `sole_positions`."""
+        _, _, ends = self._follow_links(angles)
+        return ends
+
     def soles(self, angles) -> tuple[np.ndarray, np.ndarray]:
         """Return the positions (..., legs, 3) of the soles, m, and their Jacobians (..., legs, 3, links).
 

@@ -57,12 +57,12 @@ def flaws(body: Body) -> list[Flaw]:
     height_flaws = [*_check_feet(body, pose), *_check_torso(body, pose)]
     if any(flaw.hopeless for flaw in height_flaws):
         return height_flaws
-    return [*_check_all_but_parts(body), *_check_parts(body)]
+    return [*_check_all_but_overlaps(body), *_check_overlaps(body)]
 
 
 def has_flaws(body: Body) -> bool:
     """Return whether a body has flaws; it is quicker than `flaws`, as it looks for no second one and for no cure."""
-    return any(_check_all_but_parts(body)) or any(overlaps(body))
+    return any(_check_all_but_overlaps(body)) or any(overlaps(body))
 
 
 def hopeless_flaws(body: Body) -> list[Flaw]:
@@ -77,7 +77,8 @@ def hopeless_flaws(body: Body) -> list[Flaw]:
     return body_flaws
 
 
-def _check_all_but_parts(body: Body) -> Iterator[Flaw]:
+def _check_all_but_overlaps(body: Body) -> Iterator[Flaw]:
+    """Find all flaws except overlaps, which take the longest to find."""
     pose = measure_standing(body)
     for check in (_check_feet, _check_torso, _check_legs, _check_mounts, _check_support, _check_motors, _check_joints):
         yield from check(body, pose)
@@ -143,7 +144,7 @@ def _check_mounts(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
 def _mount_in_torso(body: Body, is_apart: np.ndarray) -> Body | None:
     """Return the body with legs that are apart from the torso mounted nearer to its middle; None if none touches it."""
     for share in _SHARES_OF_MOUNTS:
-        attached_body = _return_if_whole(_spread_mounts(body, np.where(is_apart, share, 1.0)))
+        attached_body = _keep_if_whole(_spread_mounts(body, np.where(is_apart, share, 1.0)))
         if attached_body is not None:
             return attached_body
     return None
@@ -165,7 +166,7 @@ def _check_support(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
             f"a tower that tips over when tilted by {tilt:.2g} degrees: "
             f"feet {distance:.2g} m further out all around fit"
         )
-        yield Flaw(text, False, _return_if_whole(_move_legs(body, outwards)))
+        yield Flaw(text, False, _keep_if_whole(_move_legs(body, outwards)))
 
 
 def _overhang_flaw(body: Body, pose: PoseMechanics) -> Flaw:
@@ -182,7 +183,7 @@ def _overhang_flaw(body: Body, pose: PoseMechanics) -> Flaw:
     share_of_rest = 1.0 - _mass_of_legs(body) / pose.mass
     x, y, _ = (pose.center - middle) / share_of_rest
     cure = _move_legs(body, [(x, y)] * len(body.legs))
-    return Flaw(f"{error}: legs {_describe_displacement(x, y)} fit", is_hopeless, _return_if_whole(cure))
+    return Flaw(f"{error}: legs {_describe_displacement(x, y)} fit", is_hopeless, _keep_if_whole(cure))
 
 
 def _mass_of_legs(body: Body) -> float:
@@ -283,7 +284,7 @@ def _remove_motors(body: Body, is_removed: Sequence[bool]) -> Body:
     return body.replace(legs=tuple(legs))
 
 
-def _return_if_whole(body: Body) -> Body | None:
+def _keep_if_whole(body: Body) -> Body | None:
     """Return the body, or None if legs of it begin apart from the torso."""
     return body if (measure_gaps(body) <= 0.0).all() else None
 
@@ -350,7 +351,7 @@ def _largest_lift(leg: Leg) -> float:
     return max(lifts)
 
 
-def _check_parts(body: Body) -> Iterator[Flaw]:
+def _check_overlaps(body: Body) -> Iterator[Flaw]:
     """Find legs that overlap, with each other or with the torso."""
     deepest = max(overlaps(body), key=lambda overlap: overlap.depth, default=None)
     if deepest is None:

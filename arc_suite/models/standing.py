@@ -1,6 +1,7 @@
 """The standing pose of a body, all joints at zero; proportions, motors and gait derive from it."""
 
 import functools
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
@@ -50,6 +51,21 @@ class PoseMechanics(NamedTuple):
 def measure_standing(body: Body) -> PoseMechanics:
     """Return the mechanics of a body's standing pose; armature, damping, motors and constants do not matter."""
     return pose_mechanics(body)
+
+
+def time_unit(body: Body) -> float:
+    """Return the time in which gravity moves a body by about its height, sqrt(h / g), s."""
+    return math.sqrt(body.torso.standing_height / GRAVITY)
+
+
+def velocity_unit(body: Body) -> float:
+    """Return the speed of a body that falls by half of its height, sqrt(g h), m/s."""
+    return math.sqrt(GRAVITY * body.torso.standing_height)
+
+
+def rate_unit(body: Body) -> float:
+    """Return the unit of frequencies, sqrt(g / h), 1/s."""
+    return math.sqrt(GRAVITY / body.torso.standing_height)
 
 
 def pose_mechanics(

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from arc_suite.models.kinematics import damped_changes
-from arc_suite.models.standing import GRAVITY, measure_standing, mechanics_of_poses
+from arc_suite.models.standing import measure_standing, mechanics_of_poses, time_unit
 from arc_suite.robots import gaits
 from arc_suite.robots.spec import Body, Leg
 
@@ -111,8 +111,7 @@ def swing_accelerations(body: Body) -> np.ndarray:
     A foot is lifted as a sine of time, and turns from going back to going forward in half of the swing.
     """
     gait = fitted_gait(body)
-    time_unit = math.sqrt(body.torso.standing_height / GRAVITY)  # s
-    duration = (1.0 - gait.duty_factor) / gait_frequency(body) * time_unit  # s, of a swing
+    duration = (1.0 - gait.duty_factor) / gait_frequency(body) * time_unit(body)  # s, of a swing
     strokes_of_legs = strokes(body, half_stroke(body, gait))
     sweeps = np.concatenate([sweep for sweep, _ in strokes_of_legs])
     lifts = np.concatenate([lift for _, lift in strokes_of_legs])

@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import checks, rotations
-from arc_suite.models import sizing, visuals
+from arc_suite.models import visuals
+from arc_suite.models.standing import time_unit
 from arc_suite.models.visuals.springs import SPRINGS
 from arc_suite.robots.spec import Body
 
@@ -83,7 +84,7 @@ def _make_bone(body: Body, bone: visuals.Bone) -> SwingingBone:
     swing = Swing(
         tip=tip,
         mass=0.5 * tip,
-        frequency=spring.frequency / sizing.time_unit(body),
+        frequency=spring.frequency / time_unit(body),
         damping=spring.damping,
         limit=math.radians(spring.limit),
         pivot_radius=bone.pivot_radius,
