@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from arc_suite.animation.colors import BLUE, FAINT, INK, PALE, VERMILION, term_colors
+from arc_suite.motions.runs import find_runs
 from arc_suite.style import metrics
 from arc_suite.style.tracks import Track
 
@@ -123,7 +124,7 @@ def _draw_stances(axis, track: Track) -> None:
         )
         for is_shown, height, color in bars:
             spans = []  # pairs of a start and a duration, s
-            for first, end in _find_runs(is_shown):
+            for first, end in find_runs(is_shown):
                 spans.append((start + track.time_step * first, track.time_step * (end - first)))
             axis.broken_barh(spans, (leg - height / 2, height), color=color, linewidth=0)
     axis.set_xlim(start, start + track.time_step * len(stance))
@@ -270,12 +271,6 @@ def _first_target_velocity(tracks: Mapping[str, Track]) -> float:
     """Return the target velocity of the first track, m/s; NaN if it has none."""
     first_track, *_ = tracks.values()
     return first_track.target_velocity
-
-
-def _find_runs(mask):
-    """Return the first and one past the last index of every run of true values."""
-    padded = np.concatenate([[False], mask, [False]])
-    return np.flatnonzero(np.diff(padded.astype(int))).reshape(-1, 2)
 
 
 def _steps_in_a_cycle(track: Track) -> float:

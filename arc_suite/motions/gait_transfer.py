@@ -9,10 +9,19 @@ import numpy as np
 
 from arc_suite import robots, rotations
 from arc_suite.models.stride import fitted_gait
-from arc_suite.motions import motion as values
-from arc_suite.motions.ground_poses import compose, ground_poses, integrate_twist, relative_pose, twist_to
-from arc_suite.motions.motion import Motion
+from arc_suite.motions.ground_poses import (
+    compose,
+    ground_poses,
+    integrate_twist,
+    place_points,
+    relative_points,
+    relative_pose,
+    twist_to,
+)
+from arc_suite.motions.motion import Motion, find_rest
 from arc_suite.motions.paths import Paths, Size, match_feet, scale_heights, shrink_turns, time_scale
+from arc_suite.motions.runs import find_runs
+from arc_suite.motions.sampling import sample_linearly
 from arc_suite.robots import gaits
 from arc_suite.robots.spec import Body
 
@@ -27,6 +36,22 @@ class _Steps(NamedTuple):
 
     starts: np.ndarray
     durations: np.ndarray
+
+
+class _SourceGait(NamedTuple):
+    """The gait of the motion that is transferred.
+
+    Attributes:
+        cycles: number of cycles in the loop.
+        duty_factor: mean share of the loop in which regular feet stand.
+        steps: steps of each foot.
+        is_regular: (feet,) whether a foot steps once in each cycle.
+    """
+
+    cycles: int
+    duty_factor: float
+    steps: list[_Steps]
+    is_regular: np.ndarray
 
 
 class _Root(NamedTuple):
@@ -64,53 +89,59 @@ def transfer(motion: Motion, body: Body, size: Size) -> tuple[Paths, list[str]]:
         body: the body that is to move.
         size: of steps and of the torso's movement.
     """
-    cycles = count_cycles(motion)
+    source_gait = _measure_gait(motion)
     gait = find_gait(body)
     height = body.torso.standing_height
-    rest_soles, rest_height = values.find_rest(body)
+    rest_soles, rest_height = find_rest(body)
     rest_soles = rest_soles / height
     partners = _find_partners(motion, rest_soles)
-    steps = [_find_steps(planted) for planted in motion.planted[:-1].T]
-    is_regular = np.array([len(of_foot.starts) == cycles for of_foot in steps])
-    duty_factor = float(np.mean([steps[foot].durations.sum() for foot in np.flatnonzero(is_regular)]))
-    duty_factor = min(max(duty_factor, _MIN_DUTY_FACTOR), _MAX_DUTY_FACTOR)
 
     # With the same strides at the same speed, a loop of a shorter stance takes less time.
-    time_ratio = duty_factor / gait.duty_factor
+    time_ratio = source_gait.duty_factor / gait.duty_factor
     seconds = motion.seconds * time_ratio * time_scale(motion.standing_height, height)
-    notes = [
-        f"gait: {cycles} cycles with a duty factor of {gait.duty_factor:.2f}, before {duty_factor:.2f}; "
-        f"{seconds:.3f} s, before {motion.seconds:.3f} s"
-    ]
-    frames = max(motion.frames, round(seconds * motion.frame_rate) + 1)
-    shares = np.linspace(0.0, 1.0, frames)
+    shares = np.linspace(0.0, 1.0, max(motion.frames, round(seconds * motion.frame_rate) + 1))
     source_root = _find_root(motion)
     root = integrate_twist(source_root.twist * time_ratio * size.all * (1.0, size.side, 1.0), shares)
     offsets = size.ahead_left_up * (_soles_on_root(motion, source_root) - motion.rest_soles)  # (frames, feet, 3)
 
-    soles = np.empty((frames, len(partners), 3))
-    planted = np.empty((frames, len(partners)), bool)
-    begin = _find_begin(steps, partners, gait, cycles, is_regular)
+    begin = _find_begin(source_gait, partners, gait)
+    soles = []
+    planted = []
     for leg, foot in enumerate(partners):
-        if not is_regular[foot]:
-            planted[:, leg] = motion.planted[_nearest_frames(shares, motion.frames), foot]
-            soles[:, leg] = _place(root, rest_soles[leg] + _sample(offsets[:, foot], shares))
-            continue
-        first_start = begin - gait.offsets[leg] / cycles
-        step_duration = gait.duty_factor / cycles
-        planted[:, leg] = (shares - first_start) % (1.0 / cycles) < step_duration
-        source_shares = _warp(shares, np.arange(cycles) / cycles + first_start, step_duration, steps[foot])
-        soles[:, leg] = _place(root, rest_soles[leg] + _sample(offsets[:, foot], source_shares))
-        soles[:, leg] = _hold_stances(soles[:, leg], planted[:, leg], root)
-    notes += _note_irregular_feet(body, partners, is_regular)
+        if source_gait.is_regular[foot]:
+            first_start = begin - gait.offsets[leg] / source_gait.cycles
+            is_planted = _find_stance(shares, first_start, gait, source_gait.cycles)
+            source_shares = _warp(shares, first_start, gait, source_gait.steps[foot])
+            path = place_points(root, rest_soles[leg] + _sample(offsets[:, foot], source_shares))
+            path = _hold_stances(path, is_planted, root)
+        else:
+            is_planted = motion.planted[_nearest_frames(shares, motion.frames), foot]
+            path = place_points(root, rest_soles[leg] + _sample(offsets[:, foot], shares))
+        soles.append(path)
+        planted.append(is_planted)
     positions, quaternions = _move_torso(motion, source_root, root, shares, rest_height / height, size)
-    return Paths(seconds, positions, quaternions, soles, planted), notes
+    paths = Paths(seconds, positions, quaternions, np.stack(soles, axis=1), np.stack(planted, axis=1))
+    gait_note = (
+        f"gait: {source_gait.cycles} cycles with a duty factor of {gait.duty_factor:.2f}, "
+        f"before {source_gait.duty_factor:.2f}; {seconds:.3f} s, before {motion.seconds:.3f} s"
+    )
+    return paths, [gait_note, *_note_irregular_feet(body, partners, source_gait.is_regular)]
 
 
 def _note_irregular_feet(body: Body, partners: list[int], is_regular: np.ndarray) -> list[str]:
     """Return a line that names the legs whose partners do not step once in each cycle; none without such legs."""
     names = [body.legs[leg].name for leg, foot in enumerate(partners) if not is_regular[foot]]
     return [f"without steps of their own in each cycle: {', '.join(names)}"] if names else []
+
+
+def _measure_gait(motion: Motion) -> _SourceGait:
+    """Return the gait of a loop of steps."""
+    cycles = count_cycles(motion)
+    steps = [_find_steps(planted) for planted in motion.planted[:-1].T]
+    is_regular = np.array([len(foot_steps.starts) == cycles for foot_steps in steps])
+    stance_shares = [steps[foot].durations.sum() for foot in np.flatnonzero(is_regular)]
+    duty_factor = min(max(float(np.mean(stance_shares)), _MIN_DUTY_FACTOR), _MAX_DUTY_FACTOR)
+    return _SourceGait(cycles, duty_factor, steps, is_regular)
 
 
 def _find_partners(motion: Motion, rest_soles: np.ndarray) -> list[int]:
@@ -133,8 +164,8 @@ def _find_steps(planted: np.ndarray) -> _Steps:
     ends = np.flatnonzero(~planted & np.roll(planted, 1))
     if not len(starts):
         return _Steps(np.zeros(0), np.zeros(0))
-    next_ends = np.array([ends[(ends - start) % frames == ((ends - start) % frames).min()][0] for start in starts])
-    return _Steps(starts / frames, ((next_ends - starts) % frames) / frames)
+    durations = ((ends - starts[:, None]) % frames).min(axis=1)  # from each start to the next end
+    return _Steps(starts / frames, durations / frames)
 
 
 def _find_root(motion: Motion) -> _Root:
@@ -150,35 +181,44 @@ def _find_root(motion: Motion) -> _Root:
 
 def _soles_on_root(motion: Motion, root: _Root) -> np.ndarray:
     """Return the soles (frames, legs, 3) in the frame of the root."""
-    ground = rotations.to_heading_frame(motion.soles[..., :2] - root.path[:, None, :2], root.path[:, None, 2])
-    return np.concatenate([ground, motion.soles[..., 2:]], axis=-1)
+    return relative_points(root.path[:, None], motion.soles)
 
 
-def _find_begin(steps, partners, gait: gaits.Gait, cycles: int, is_regular) -> float:
+def _find_begin(source_gait: _SourceGait, partners: list[int], gait: gaits.Gait) -> float:
     """Return when the gait's cycle begins, so that the first foot that steps touches down as its partner does."""
     for leg, foot in enumerate(partners):
-        if is_regular[foot]:
-            return float(steps[foot].starts[0] + gait.offsets[leg] / cycles)
+        if source_gait.is_regular[foot]:
+            return float(source_gait.steps[foot].starts[0] + gait.offsets[leg] / source_gait.cycles)
     return 0.0
 
 
-def _warp(shares: np.ndarray, starts: np.ndarray, duration: float, steps: _Steps) -> np.ndarray:
-    """Return the shares of a motion's loop at which its foot is in the phase of another foot.
+def _find_stance(shares: np.ndarray, first_start: float, gait: gaits.Gait, cycles: int) -> np.ndarray:
+    """Return whether a foot stands at shares (frames,) of a loop of a gait, in which a stance begins at a share."""
+    return (shares - first_start) % (1.0 / cycles) < gait.duty_factor / cycles
+
+
+def _warp(shares: np.ndarray, first_start: float, gait: gaits.Gait, steps: _Steps) -> np.ndarray:
+    """Return the shares of a motion's loop at which its foot is in the phase of a foot of another gait.
+
+    Both begin a stance at the same time, and end it. In between, time goes evenly.
 
     Args:
-        shares: (frames,) shares of the other loop.
-        starts: (cycles,) shares at which stances begin there.
-        duration: of these stances.
-        steps: steps of the motion's foot.
+        shares: (frames,) shares of the loop of the other gait.
+        first_start: share at which a stance begins there.
+        gait: the other gait.
+        steps: steps of the motion's foot, one in each cycle.
     """
+    cycles = len(steps.starts)
+    starts = np.arange(cycles) / cycles + first_start
+    duration = gait.duty_factor / cycles
+    # The step of the motion that begins nearest to the first of the gait comes first, and the starts of others grow.
     first = int(abs((steps.starts - starts[0] + 0.5) % 1.0 - 0.5).argmin())
-    laps = np.arange(-2, 3)
-    order = np.roll(np.arange(len(starts)), -first)
+    order = np.roll(np.arange(cycles), -first)
     source_starts = steps.starts[order] - np.floor(steps.starts[order] - steps.starts[order[0]])
     source_starts = source_starts + np.round(starts[0] - source_starts[0])
     knots = []
     source_knots = []
-    for lap in laps:
+    for lap in range(-2, 3):  # the loop goes on before and after
         for start, source_start, source_duration in zip(starts, source_starts, steps.durations[order], strict=True):
             knots += [start + lap, start + lap + duration]
             source_knots += [source_start + lap, source_start + lap + source_duration]
@@ -187,19 +227,11 @@ def _warp(shares: np.ndarray, starts: np.ndarray, duration: float, steps: _Steps
 
 def _sample(offsets: np.ndarray, shares: np.ndarray) -> np.ndarray:
     """Return offsets (n, 3) at shares (n,) of a loop of frames (frames, 3), both ends included."""
-    places = (shares % 1.0) * (len(offsets) - 1)
-    previous = np.minimum(places.astype(int), len(offsets) - 2)
-    share = (places - previous)[:, None]
-    return (1.0 - share) * offsets[previous] + share * offsets[previous + 1]
+    return sample_linearly(offsets, (shares % 1.0) * (len(offsets) - 1))
 
 
 def _nearest_frames(shares: np.ndarray, frames: int) -> np.ndarray:
     return np.rint(shares * (frames - 1)).astype(int)
-
-
-def _place(root: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return points (..., 3) of the root's frame in the world, given ground poses (..., 3) of the root."""
-    return np.concatenate([compose(root, points)[..., :2], points[..., 2:]], axis=-1)
 
 
 def _hold_stances(soles: np.ndarray, planted: np.ndarray, root: np.ndarray) -> np.ndarray:
@@ -213,36 +245,36 @@ def _hold_stances(soles: np.ndarray, planted: np.ndarray, root: np.ndarray) -> n
         planted: (frames,) when it stands.
         root: (frames, 3) ground poses, by which the loop goes on.
     """
-    frames = len(soles) - 1
-    displacement = relative_pose(root[0], root[-1])
-    back = relative_pose(displacement, np.zeros(3))
-    # Three cycles in a row, the middle one being the loop.
-    cycle_starts = [compose(root[0], back), root[0], root[-1]]
-    local = [_to_frame(soles[:-1], root[0])] * 3
-    path = np.concatenate([_place(start, part) for start, part in zip(cycle_starts, local, strict=True)])
-    stands = np.tile(planted[:-1], 3)
-    edges = np.flatnonzero(np.diff(stands.astype(int), prepend=0, append=0)).reshape(-1, 2)
-    standing = []
-    corrections = []
-    for start, end in edges.tolist():
-        place = np.append(path[start:end, :2].mean(axis=0), 0.0)
-        standing += list(range(start, end))
-        corrections += list(place - path[start:end])
-    if not standing:
+    if not planted[:-1].any():
         return soles
-    indices = np.arange(len(path))
-    correction = np.stack([np.interp(indices, standing, component) for component in np.array(corrections).T], axis=-1)
-    middle = (path + correction)[frames : 2 * frames]
+    frames = len(soles) - 1
+    path = _repeat_three_times(soles, root)
+    path = path + _correct_stances(path, np.tile(planted[:-1], 3))
+    loop = path[frames : 2 * frames]
     swing_height = soles[:, 2].max() - soles[planted, 2].mean()
-    middle[:, 2] *= (swing_height / max(middle[:, 2].max(), _MIN_HEIGHT)).clip(1.0, _MAX_STRETCH)
-    last = _place(root[-1], _to_frame(middle[:1], root[0]))
-    return np.concatenate([middle, last])
+    loop[:, 2] *= (swing_height / max(loop[:, 2].max(), _MIN_HEIGHT)).clip(1.0, _MAX_STRETCH)
+    last = place_points(root[-1], relative_points(root[0], loop[:1]))
+    return np.concatenate([loop, last])
 
 
-def _to_frame(points: np.ndarray, frame: np.ndarray) -> np.ndarray:
-    """Return points (n, 3) of the world in the frame of a ground pose (3,)."""
-    ground = rotations.to_heading_frame(points[:, :2] - frame[:2], frame[2])
-    return np.concatenate([ground, points[:, 2:]], axis=-1)
+def _repeat_three_times(soles: np.ndarray, root: np.ndarray) -> np.ndarray:
+    """Return the path of a sole in the loop before, in the loop and in the one after it, without its last frame."""
+    back = relative_pose(relative_pose(root[0], root[-1]), np.zeros(3))
+    starts = (compose(root[0], back), root[0], root[-1])  # where the root begins the three loops
+    path_on_root = relative_points(root[0], soles[:-1])
+    return np.concatenate([place_points(start, path_on_root) for start in starts])
+
+
+def _correct_stances(path: np.ndarray, is_planted: np.ndarray) -> np.ndarray:
+    """Return what to add to a path (frames, 3) so that a sole stays in one place of the ground in each stance."""
+    stance_frames = np.flatnonzero(is_planted)
+    corrections = []  # of these frames
+    for start, end in find_runs(is_planted).tolist():
+        place = np.append(path[start:end, :2].mean(axis=0), 0.0)
+        corrections.append(place - path[start:end])
+    components = np.concatenate(corrections).T
+    frames = np.arange(len(path))
+    return np.stack([np.interp(frames, stance_frames, component) for component in components], axis=-1)
 
 
 def _move_torso(
@@ -260,4 +292,4 @@ def _move_torso(
     )
     quaternions = _sample(local_quaternions, shares)
     quaternions /= np.linalg.norm(quaternions, axis=-1, keepdims=True)
-    return _place(root, local_positions), rotations.turn_about_z(quaternions, root[:, 2])
+    return place_points(root, local_positions), rotations.turn_about_z(quaternions, root[:, 2])

@@ -31,6 +31,17 @@ def compose(origin, local) -> np.ndarray:
     return np.concatenate([position, origin[..., 2:] + local[..., 2:]], axis=-1)
 
 
+def place_points(origin, points) -> np.ndarray:
+    """Return the points (..., 3) in the world that are `points` (..., 3) in the frames of `origin` (..., 3)."""
+    return np.concatenate([compose(origin, points)[..., :2], points[..., 2:]], axis=-1)
+
+
+def relative_points(origin, points) -> np.ndarray:
+    """Return points (..., 3) of the world in the frames of ground poses `origin` (..., 3)."""
+    ground = rotations.to_heading_frame(points[..., :2] - origin[..., :2], origin[..., 2])
+    return np.concatenate([ground, points[..., 2:]], axis=-1)
+
+
 def integrate_twist(twist, times) -> np.ndarray:
     """Return the ground poses (times, 3) to which a constant twist leads from 0.
 

@@ -130,10 +130,10 @@ def make(
         rest_soles=rest_soles / standing_height,
         rest_height=rest_height / standing_height,
     )
-    return check(motion)
+    return check_motion(motion)
 
 
-def check(motion: Motion) -> Motion:
+def check_motion(motion: Motion) -> Motion:
     """Return a motion after a check of its numbers.
 
     Raises:
@@ -247,7 +247,7 @@ def find_soles(legs: Legs, positions: np.ndarray, quaternions: np.ndarray, angle
         angles: (frames, joints) rad.
     """
     below_foot = legs.radii[:, None] * (0.0, 0.0, 1.0)
-    soles, _ = legs.soles(legs.by_leg(angles))  # in the torso's frame; below the feet where the torso is level
+    soles = legs.sole_positions(legs.by_leg(angles))  # in the torso's frame; below the feet where the torso is level
     centers = (rotations.matrix(quaternions)[:, None] @ (soles + below_foot)[..., None])[..., 0]
     return positions[:, None] + centers - below_foot
 

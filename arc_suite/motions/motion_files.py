@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from arc_suite import archives, checks, files, parsers
-from arc_suite.motions import motion as values
-from arc_suite.motions.motion import Motion
+from arc_suite.motions.motion import Motion, check_motion
 
 EXTENSION = ".npz"
 FORMAT = "arc_suite motion 1"  # another number for every change of what a file holds
@@ -86,7 +85,7 @@ def _read(arrays: dict[str, np.ndarray]) -> Motion:
             if array.dtype.kind not in kinds:
                 raise ValueError(f"{name}: expected {'booleans' if kinds == 'b' else 'numbers'}, got {array.dtype}")
             fields[name] = array.astype(bool if kinds == "b" else float)
-    return values.check(Motion(**fields))
+    return check_motion(Motion(**fields))
 
 
 def read_names(field: str, array: np.ndarray, dimensions: int) -> tuple[str, ...]:

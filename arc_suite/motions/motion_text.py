@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from arc_suite import checks, parsers
-from arc_suite.motions import motion as values
-from arc_suite.motions.motion import Motion
+from arc_suite.motions.motion import MAX_FRAMES, Motion, array_shapes, check_motion
 from arc_suite.motions.motion_files import EXTENSION, NAMES, SCALARS, TEXTS, load, read_names
 
 MAX_TEXT = 1 << 23  # characters
@@ -32,7 +31,7 @@ def to_text(motion: Motion) -> str:
         ValueError: more frames than a text may have.
     """
     fields = motion._asdict()
-    shapes = values.array_shapes(motion.frames, len(motion.joint_names), len(motion.leg_names))
+    shapes = array_shapes(motion.frames, len(motion.joint_names), len(motion.leg_names))
     arrays = [fields.pop(name) for name in shapes]
     numbers = np.concatenate([array.astype("<f8").ravel() for array in arrays])
     compressed = zlib.compress(numbers.tobytes(), 9)
@@ -99,8 +98,8 @@ def _read(fields: Mapping[str, Any]) -> Motion:
     """Return the motion of fields by name; damaged ones raise anything."""
     names = {name: read_names(name, np.array(fields[name], str), 1) for name in NAMES}
     texts = {name: read_names(name, np.array(fields[name], str), 0)[0] for name in TEXTS}
-    frames = checks.integer("frames", fields["frames"], 2, values.MAX_FRAMES)
-    shapes = values.array_shapes(frames, len(names["joint_names"]), len(names["leg_names"]))
+    frames = checks.integer("frames", fields["frames"], 2, MAX_FRAMES)
+    shapes = array_shapes(frames, len(names["joint_names"]), len(names["leg_names"]))
     sizes = [math.prod(shape) for shape in shapes.values()]
     if sum(sizes) > frames * _MAX_COLUMNS:
         raise ValueError(f"expected at most {_MAX_COLUMNS} numbers in a frame")
@@ -113,4 +112,4 @@ def _read(fields: Mapping[str, Any]) -> Motion:
     motion_fields: dict[str, Any] = {**texts, **names, **arrays, "planted": arrays["planted"] > 0.5}
     for name in SCALARS:
         motion_fields[name] = checks.number(name, fields[name])
-    return values.check(Motion(loops=checks.boolean("loops", fields["loops"]), **motion_fields))
+    return check_motion(Motion(loops=checks.boolean("loops", fields["loops"]), **motion_fields))

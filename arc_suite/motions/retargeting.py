@@ -9,12 +9,13 @@ from collections.abc import Callable
 from typing import NamedTuple, Self
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from arc_suite import rotations
 from arc_suite.models.foot_paths import RELAXING_SHARE
 from arc_suite.models.kinematics import Legs
 from arc_suite.models.posture import find_rest_pose
-from arc_suite.models.standing import GRAVITY, measure_standing, stability_margin
+from arc_suite.models.standing import measure_standing, stability_margin, time_unit
 from arc_suite.motions import gait_transfer
 from arc_suite.motions.motion import Motion, find_rest, make
 from arc_suite.motions.paths import Paths, Size, match_feet, scale_heights, shrink_turns, time_scale
@@ -178,7 +179,7 @@ def _carry_torso(body: Body, paths: Paths) -> tuple[Paths, list[str]]:
         shifts[frame] = _find_shift(center[:2], soles[planted, :2])
     if not shifts.any():
         return paths, []
-    smooth_shifts = _spread(shifts, paths, height)
+    smooth_shifts = _spread(body, shifts, paths)
     shifted_paths = paths._replace(positions=paths.positions + np.pad(smooth_shifts, ((0, 0), (0, 1))))
     margins = [
         stability_margin(center[:2] + shift, soles[planted])
@@ -208,16 +209,18 @@ def _find_shift(center: np.ndarray, soles: np.ndarray) -> np.ndarray:
     return high * to_middle
 
 
-def _spread(shifts: np.ndarray, paths: Paths, height: float) -> np.ndarray:
-    """Return shifts (frames, 2) that begin before they are needed and end after it, smoothly."""
-    frames = len(shifts)
-    frame_time = paths.seconds / (frames - 1)
-    width = max(1, round(_SHIFT_TIME * math.sqrt(height / GRAVITY) / frame_time))
-    padded = np.pad(shifts, ((2 * width, 2 * width), (0, 0)), mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * width + 1, axis=0)
-    sizes = np.linalg.norm(windows, axis=1)
-    needed = np.take_along_axis(windows, sizes.argmax(axis=-1)[:, None, None], axis=-1)[..., 0]
-    return np.lib.stride_tricks.sliding_window_view(needed, 2 * width + 1, axis=0).mean(axis=-1)
+def _spread(body: Body, shifts: np.ndarray, paths: Paths) -> np.ndarray:
+    """Return shifts (frames, 2) that begin before they are needed and end after it, smoothly.
+
+    The largest shift of the frames around each one is taken. The mean of these over as many frames is smooth.
+    """
+    frame_time = paths.seconds / (len(shifts) - 1)
+    width = max(1, round(_SHIFT_TIME * time_unit(body) / frame_time))  # frames to either side
+    padded_shifts = np.pad(shifts, ((2 * width, 2 * width), (0, 0)), mode="edge")
+    windows = sliding_window_view(padded_shifts, 2 * width + 1, axis=0)  # (n, 2, frames of a window)
+    largest_of_window = np.linalg.norm(windows, axis=1).argmax(axis=-1)
+    largest_shifts = np.take_along_axis(windows, largest_of_window[:, None, None], axis=-1)[..., 0]
+    return sliding_window_view(largest_shifts, 2 * width + 1, axis=0).mean(axis=-1)
 
 
 # Legs.
@@ -338,5 +341,5 @@ class _Search(NamedTuple):
 
     def _measure_fit(self, angles: np.ndarray) -> _Fit:
         """Return angles (frames, legs, links), rad, by joint, with how far feet miss their goals."""
-        feet, _ = self.legs.soles(angles)
+        feet = self.legs.foot_centers(angles)
         return _Fit(self.legs.by_joint(angles), np.linalg.norm(feet - self.goals, axis=-1) / self.standing_height)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.motions.ground_poses import compose, relative_pose
+from arc_suite.motions.ground_poses import compose, place_points, relative_pose
 from arc_suite.motions.motion import Motion
 
 
@@ -78,9 +78,9 @@ def repeat(motion: Motion, first: int, stop: int) -> Motion:
     frames = _select(motion, indices % last)
     start_of_soles = start[:, None] / (motion.standing_height, motion.standing_height, 1.0)
     return frames._replace(
-        positions=_move(frames.positions, start),
+        positions=place_points(start, frames.positions),
         quaternions=rotations.turn_about_z(frames.quaternions, start[:, 2]),
-        soles=_move(frames.soles, start_of_soles),
+        soles=place_points(start_of_soles, frames.soles),
     )
 
 
@@ -101,6 +101,18 @@ def velocities(motion: Motion) -> Velocities:
     )
 
 
+def sample_linearly(values: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return values (n, components) on straight lines between frames.
+
+    Args:
+        values: (frames, components)
+        places: (n,) fractions of frames, from 0 to the last one.
+    """
+    previous = np.minimum(places.astype(int), len(values) - 2)
+    share = (places - previous)[:, None]
+    return (1.0 - share) * values[previous] + share * values[previous + 1]
+
+
 def _select(motion: Motion, indices: np.ndarray) -> Motion:
     return motion._replace(
         positions=motion.positions[indices],
@@ -109,11 +121,6 @@ def _select(motion: Motion, indices: np.ndarray) -> Motion:
         planted=motion.planted[indices],
         soles=motion.soles[indices],
     )
-
-
-def _move(points: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Return points (..., 3) in the world that are relative to ground poses (..., 3)."""
-    return np.concatenate([compose(start, points)[..., :2], points[..., 2:]], axis=-1)
 
 
 def _interpolate(values: np.ndarray, previous: np.ndarray, share: np.ndarray) -> np.ndarray:

@@ -4,14 +4,14 @@ Tools turn the axes of bones, but not what a bone does to the mesh: the rotation
 rotation of a bone relative to the one above it, projected on the hinge, is how far the joint is from its bound angle.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from arc_suite import checks, rotations
 from arc_suite.models.kinematics import Legs
-from arc_suite.motions import motion as values
-from arc_suite.motions.motion import Motion
+from arc_suite.motions.motion import MAX_SEAM, Motion, make, make_continuous
 from arc_suite.robots.spec import Body
 
 # From axes with y up and z ahead, as of glTF, to those of the suite, x ahead and z up.
@@ -27,7 +27,7 @@ _MAX_SCALE_ERROR = 0.01  # of a file whose unit is a meter
 _MAX_BIND_MISS = 0.02  # standing heights, of a bone in the bound pose
 _MIN_NAMED_MISS = 0.05  # degrees, or hundredths of a standing height
 
-# The search for the bound pose, by Levenberg and Marquardt.
+# The search for the bound pose; see `_minimize`.
 _ITERATIONS = 60
 _DIFFERENCE = 1e-6  # rad or standing heights
 _DAMPING = 1e-6
@@ -103,56 +103,103 @@ class _BindPose(NamedTuple):
     angles: np.ndarray
 
 
-def fit_skeleton(body: Body, skeleton: Skeleton, may_turn: bool = True) -> tuple[Motion, list[str]]:
+def fit_skeleton(body: Body, skeleton: Skeleton) -> tuple[Motion, list[str]]:
     """Return the motion of a body that a skeleton has, and a line for each thing that was changed.
 
     Args:
         body: the body that moves.
         skeleton: its bones, with y up in the file, or else z.
-        may_turn: whether z may point up in the file.
 
     Raises:
         ValueError: a bone is missing or has another length than the body's, or a number is not finite.
     """
-    notes: list[str] = []
     chain = _Chain.of(body)
-    indices = _find_bones(body, skeleton.bones)
-    bind_positions = skeleton.bind_positions[indices]
-    positions = skeleton.positions[:, indices]
-    turns = skeleton.turns[:, indices]
-    bind_positions = bind_positions / _find_scale(body, chain, bind_positions)
-    scale = _find_scale(body, chain, positions[0])
-    positions = positions / scale
-    if abs(scale - 1.0) > _MAX_SCALE_ERROR:
-        notes.append(f"lengths are divided by {scale:.4g}")
-    bind_pose = _find_bind_pose(body, chain, bind_positions)
+    bones = _choose_bones(body, chain, skeleton)
+    bind_pose = _find_bind_pose(body, chain, bones.bind_positions)
+    if bind_pose.orientation[2, 2] < _MIN_UPRIGHT:  # z points up in the file
+        bones = _choose_bones(body, chain, _turn(skeleton, _FROM_Z_UP))
+        bind_pose = _find_bind_pose(body, chain, bones.bind_positions)
     if bind_pose.orientation[2, 2] < _MIN_UPRIGHT:
-        if not may_turn:
-            raise ValueError(f"bones: expected a bound pose of {body.name} that stands upright")
-        return fit_skeleton(body, _turn(skeleton, _FROM_Z_UP), may_turn=False)
-    angles, off_hinge = _find_angles(chain, bind_pose, turns)
-    torso_turns = turns[:, 0] @ bind_pose.orientation
+        raise ValueError(f"bones: expected a bound pose of {body.name} that stands upright")
+    angles, off_hinge = _find_angles(chain, bind_pose, bones.turns)
+    torso_turns = bones.turns[:, 0] @ bind_pose.orientation
+    notes = [
+        *_note_scale(bones.scale),
+        *_note_turns_off_hinges(body, off_hinge),
+        *_note_misses(body, chain, bones.positions, torso_turns, angles),
+    ]
+    positions = bones.positions[:, 0]
     quaternions = rotations.from_matrix(torso_turns)
-    worst_frame, worst_part = np.unravel_index(off_hinge.argmax(), off_hinge.shape)
-    worst_degrees = float(np.degrees(off_hinge.max()))
-    if worst_degrees > _MIN_NAMED_MISS:
-        notes.append(
-            f"{body.part_names[worst_part]} turns {worst_degrees:.2g} degrees about other axes than its hinge "
-            f"in frame {worst_frame}; they are left out"
-        )
-    placed_parts, _ = chain.place(angles)
-    placed_parts = positions[:, :1] + (torso_turns[:, None] @ placed_parts[..., None])[..., 0]
-    misses = np.linalg.norm(placed_parts - positions, axis=-1) / body.torso.standing_height
-    if misses.max() > 0.01 * _MIN_NAMED_MISS:
-        part = body.part_names[int(misses.max(axis=0).argmax())]
-        notes.append(f"{part} misses its place by {misses.max():.3f} standing heights")
-    positions = positions[:, 0]
     if skeleton.loops:
         positions, quaternions, angles, seam = close_loop(positions, quaternions, angles)
         if seam > np.radians(0.1):
             notes.append(f"the loop was open by {np.degrees(seam):.2g} degrees, which its end takes up")
-    motion = values.make(body, skeleton.name, skeleton.frame_rate, skeleton.loops, positions, quaternions, angles)
+    motion = make(body, skeleton.name, skeleton.frame_rate, skeleton.loops, positions, quaternions, angles)
     return motion, notes
+
+
+class _Bones(NamedTuple):
+    """The bones of a skeleton that are parts of a body, in its order, in m; see `Skeleton`.
+
+    Attributes:
+        bind_positions: (parts, 3) where they begin in the bound pose.
+        positions: (frames, parts, 3) where they begin.
+        turns: (frames, parts, 3, 3) rotations from the bound pose to each frame.
+        scale: lengths of the file were divided by it.
+    """
+
+    bind_positions: np.ndarray
+    positions: np.ndarray
+    turns: np.ndarray
+    scale: float
+
+
+def _choose_bones(body: Body, chain: _Chain, skeleton: Skeleton) -> _Bones:
+    """Return the bones of a body's parts; a ValueError if one is missing or has another length."""
+    indices = _find_bones(body, skeleton.bones)
+    bind_positions = skeleton.bind_positions[indices]
+    positions = skeleton.positions[:, indices]
+    bind_scale = _find_scale(body, chain, bind_positions)
+    scale = _find_scale(body, chain, positions[0])
+    return _Bones(bind_positions / bind_scale, positions / scale, skeleton.turns[:, indices], scale)
+
+
+def _note_scale(scale: float) -> list[str]:
+    """Return a line for lengths that are not in m."""
+    if abs(scale - 1.0) <= _MAX_SCALE_ERROR:
+        return []
+    return [f"lengths are divided by {scale:.4g}"]
+
+
+def _note_turns_off_hinges(body: Body, off_hinge: np.ndarray) -> list[str]:
+    """Return a line for the largest turn (frames, parts), rad, that is not about the hinge of its part."""
+    frame, part = np.unravel_index(off_hinge.argmax(), off_hinge.shape)
+    degrees = float(np.degrees(off_hinge.max()))
+    if degrees <= _MIN_NAMED_MISS:
+        return []
+    name = body.part_names[part]
+    return [f"{name} turns {degrees:.2g} degrees about other axes than its hinge in frame {frame}; they are left out"]
+
+
+def _note_misses(
+    body: Body, chain: _Chain, positions: np.ndarray, torso_turns: np.ndarray, angles: np.ndarray
+) -> list[str]:
+    """Return a line for the part that is farthest from its bone.
+
+    Args:
+        body: the body that moves.
+        chain: its parts.
+        positions: (frames, parts, 3) where bones begin, m.
+        torso_turns: (frames, 3, 3) orientations of the torso.
+        angles: (frames, joints) rad.
+    """
+    parts_from_torso, _ = chain.place(angles)
+    part_positions = positions[:, :1] + (torso_turns[:, None] @ parts_from_torso[..., None])[..., 0]
+    misses = np.linalg.norm(part_positions - positions, axis=-1) / body.torso.standing_height
+    if misses.max() <= 0.01 * _MIN_NAMED_MISS:
+        return []
+    name = body.part_names[int(misses.max(axis=0).argmax())]
+    return [f"{name} misses its place by {misses.max():.3f} standing heights"]
 
 
 def _turn(skeleton: Skeleton, rotation: np.ndarray) -> Skeleton:
@@ -171,7 +218,7 @@ def close_loop(
 
     The last quarter of the loop takes up the difference. A loop that is open by more than `MAX_SEAM` stays open.
     """
-    quaternions = values.make_continuous(quaternions)
+    quaternions = make_continuous(quaternions)
     turn = rotations.yaw(quaternions[-1]) - rotations.yaw(quaternions[0])
     last_quaternion = rotations.turn_about_z(quaternions[0], turn)
     if last_quaternion @ quaternions[-1] < 0.0:
@@ -179,7 +226,7 @@ def close_loop(
     angle_difference = angles[0] - angles[-1]
     quaternion_difference = last_quaternion - quaternions[-1]
     seam = float(max(abs(angle_difference).max(initial=0.0), 2.0 * np.linalg.norm(quaternion_difference)))
-    if seam > values.MAX_SEAM:
+    if seam > MAX_SEAM:
         return positions, quaternions, angles, 0.0
     share = (np.linspace(-3.0, 1.0, len(angles)).clip(0.0))[:, None]
     weights = share**2 * (3.0 - 2.0 * share)
@@ -231,25 +278,43 @@ def _find_bind_pose(body: Body, chain: _Chain, positions: np.ndarray) -> _BindPo
     height = body.torso.standing_height
     joints = len(body.joint_names)
     goals = positions / height
-
-    def place(parameters: np.ndarray) -> np.ndarray:
-        """Return positions (..., parts, 3), given turns, shifts in standing heights, and angles (..., 6 + joints)."""
-        parts, _ = chain.place(parameters[..., 6:])
-        matrices = start.orientation @ _rotation_matrices(parameters[..., :3])
-        return (matrices[..., None, :, :] @ (parts / height)[..., None])[..., 0] + parameters[..., None, 3:6]
-
     resting_positions, _ = chain.place(np.zeros(joints))
     start = _align(resting_positions / height, goals)
-    best = np.concatenate([np.zeros(3), start.position, np.zeros(joints)])
-    residual = (place(best) - goals).ravel()
+
+    def measure_misses(parameters: np.ndarray) -> np.ndarray:
+        """Return misses (..., parts, 3) at a turn and a shift of the torso and at angles, (..., 3 + 3 + joints)."""
+        turns, shifts, angles = np.split(parameters, (3, 6), axis=-1)
+        parts, _ = chain.place(angles)
+        matrices = start.orientation @ _rotation_matrices(turns)
+        return (matrices[..., None, :, :] @ (parts / height)[..., None])[..., 0] + shifts[..., None, :] - goals
+
+    best = _minimize(measure_misses, np.concatenate([np.zeros(3), start.position, np.zeros(joints)]))
+    miss = np.linalg.norm(measure_misses(best), axis=-1).max()
+    if miss > _MAX_BIND_MISS:
+        raise ValueError(
+            f"bones: expected a bound pose of {body.name}, and the nearest one misses by {miss:.3f} standing heights"
+        )
+    turn, shift, angles = np.split(best, (3, 6))
+    return _BindPose(start.orientation @ _rotation_matrices(turn), shift * height, angles)
+
+
+def _minimize(measure: Callable[[np.ndarray], np.ndarray], start: np.ndarray) -> np.ndarray:
+    """Return parameters (n,) with the least sum of squares, by Levenberg and Marquardt.
+
+    Args:
+        measure: returns numbers, of any shape, of parameters (..., n).
+        start: (n,) parameters to begin with.
+    """
+    best = start
+    residual = measure(best).ravel()
     damping = _DAMPING
     for _ in range(_ITERATIONS):
         nearby = best + _DIFFERENCE * np.eye(len(best))
-        jacobian = ((place(nearby) - goals).reshape(len(best), -1) - residual).T / _DIFFERENCE
+        jacobian = (measure(nearby).reshape(len(best), -1) - residual).T / _DIFFERENCE
         normal = jacobian.T @ jacobian
         change = np.linalg.solve(normal + damping * np.eye(len(best)), -jacobian.T @ residual)
         candidate = best + change
-        candidate_residual = (place(candidate) - goals).ravel()
+        candidate_residual = measure(candidate).ravel()
         if candidate_residual @ candidate_residual < residual @ residual:
             best = candidate
             residual = candidate_residual
@@ -258,13 +323,7 @@ def _find_bind_pose(body: Body, chain: _Chain, positions: np.ndarray) -> _BindPo
             damping *= 10.0
         if abs(change).max() < 1e-10:
             break
-    miss = np.linalg.norm(residual.reshape(-1, 3), axis=-1).max()
-    if miss > _MAX_BIND_MISS:
-        raise ValueError(
-            f"bones: expected a bound pose of {body.name}, and the nearest one misses by {miss:.3f} standing heights"
-        )
-    orientation = start.orientation @ _rotation_matrices(best[:3])
-    return _BindPose(orientation, best[3:6] * height, best[6:])
+    return best
 
 
 def _align(points: np.ndarray, goals: np.ndarray) -> _BindPose:
@@ -283,16 +342,16 @@ def _find_angles(chain: _Chain, bind_pose: _BindPose, turns: np.ndarray) -> tupl
     axes = axes @ bind_pose.orientation.T  # in the world, in the bound pose
     relative_turns = turns[:, chain.parents].swapaxes(-1, -2) @ turns
     quaternions = rotations.from_matrix(relative_turns)
-    along = (quaternions[..., 1:] * axes).sum(axis=-1)
-    is_hinge = axes.any(axis=-1)
-    half_turns = np.arctan2(along, quaternions[..., 0])
+    # A rotation is a turn about the hinge, with these two numbers of its quaternion, and then one about an axis across.
+    cosines = quaternions[..., 0]
+    sines = (quaternions[..., 1:] * axes).sum(axis=-1)
+    half_turns = np.arctan2(sines, cosines)
     half_turns = np.unwrap(half_turns, period=np.pi, axis=0)  # q and -q are one rotation
     half_turns -= np.pi * np.round(half_turns[:1] / np.pi)  # the first one is the shorter way round
-    shares = np.hypot(along, quaternions[..., 0])
-    off_hinge = 2.0 * np.arccos(shares.clip(0.0, 1.0))
+    off_hinge = 2.0 * np.arccos(np.hypot(sines, cosines).clip(0.0, 1.0))
     off_hinge[:, 0] = 0.0  # the torso is free
-    hinge_parts = np.flatnonzero(is_hinge)
-    return bind_pose.angles + 2.0 * half_turns[:, hinge_parts], off_hinge
+    has_hinge = axes.any(axis=-1)
+    return bind_pose.angles + 2.0 * half_turns[:, has_hinge], off_hinge
 
 
 def _rotation_matrices(vectors: np.ndarray) -> np.ndarray:

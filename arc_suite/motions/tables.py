@@ -4,14 +4,14 @@ Angles and the pose of the root are those of the robot's own file; the suite cou
 """
 
 import os
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from arc_suite import checks, files, parsers, rotations
 from arc_suite.models import source
-from arc_suite.motions import motion as values
-from arc_suite.motions.motion import MAX_FRAMES, Motion
+from arc_suite.motions.motion import MAX_FRAMES, Motion, make, make_continuous
 from arc_suite.motions.skeletons import CURE, close_loop
 from arc_suite.robots.spec import Body
 
@@ -48,20 +48,7 @@ def read_csv(path: str | os.PathLike[str], body: Body, rate: float | None, loops
     """
     text = files.read_utf8(path, _MAX_BYTES)
     with parsers.guard(f"{path}"):
-        lines = [line for line in text.splitlines() if line.strip()]
-        if not 2 <= len(lines) <= MAX_FRAMES + 1:
-            raise ValueError(f"expected from 2 to {MAX_FRAMES} frames, got {len(lines)} lines")
-        first_words = [word.strip().strip('"') for word in lines[0].split(",")]
-        if len(first_words) > _MAX_COLUMNS:
-            raise ValueError(f"expected at most {_MAX_COLUMNS} columns, got {len(first_words)}")
-        has_names = not _is_number(first_words[0])
-        names = first_words if has_names else [*_POSITION, *_QUATERNION[1:], _QUATERNION[0], *body.joint_names]
-        frame_lines = list(enumerate(lines, start=1))[1 if has_names else 0 :]
-        frames = [_read_line(line, len(names), number) for number, line in frame_lines]
-        table = np.array(frames)
-        columns = {name: table[:, index] for index, name in enumerate(names)}
-        if len(columns) < len(names):
-            raise ValueError("expected each column once")
+        columns = _read_columns(text, body)
         if _TIME in columns:
             rate, columns = _even_rate(columns)
         return _make(path, body, rate, loops, columns)
@@ -96,39 +83,80 @@ def read_arrays(
         return _make(path, body, rate, loops, columns)
 
 
+def _read_columns(text: str, body: Body) -> dict[str, np.ndarray]:
+    """Return the columns (frames,) of a table by name; without a line of names, those of `read_csv`."""
+    lines = [line for line in text.splitlines() if line.strip()]
+    if not 2 <= len(lines) <= MAX_FRAMES + 1:
+        raise ValueError(f"expected from 2 to {MAX_FRAMES} frames, got {len(lines)} lines")
+    first_words = [word.strip().strip('"') for word in lines[0].split(",")]
+    if len(first_words) > _MAX_COLUMNS:
+        raise ValueError(f"expected at most {_MAX_COLUMNS} columns, got {len(first_words)}")
+    names = [*_POSITION, *_QUATERNION[1:], _QUATERNION[0], *body.joint_names]
+    first_frame = 0  # index of its line
+    if not _is_number(first_words[0]):
+        names = first_words
+        first_frame = 1
+    frames = []
+    for number, line in enumerate(lines[first_frame:], start=first_frame + 1):
+        frames.append(_read_line(line, len(names), number))
+    table = np.array(frames)
+    columns = {name: table[:, index] for index, name in enumerate(names)}
+    if len(columns) < len(names):
+        raise ValueError("expected each column once")
+    return columns
+
+
 def _make(
     path: str | os.PathLike[str], body: Body, rate: float | None, loops: bool, columns: dict[str, np.ndarray]
 ) -> Motion:
     """Return the motion of columns (frames,) by name."""
     expected_names = (*_POSITION, *_QUATERNION, *body.joint_names)
-    for name in expected_names:
-        if name not in columns:
-            raise ValueError(
-                f"columns: expected those of {body.name}, and there is no {name}{checks.hint(name, columns)}{CURE}"
-            )
-    for name in columns:
-        if name not in expected_names:
-            raise ValueError(
-                f"columns: {checks.preview(name)} is no joint of {body.name}{checks.hint(name, expected_names)}"
-            )
+    _check_names(body, columns, expected_names)
     if rate is None:
         raise ValueError("fps: expected frames a second, as the file does not say them")
     table = np.stack([columns[name] for name in expected_names], axis=-1)
     if not np.isfinite(table).all():
         frame = int(np.isfinite(table).all(axis=-1).argmin())
         raise ValueError(f"expected finite numbers in frame {frame}")
-    quaternions = values.make_continuous(table[:, 3:7])
-    angles = table[:, 7:]
     positions = table[:, :3]
+    quaternions = make_continuous(table[:, 3:7])
+    angles = table[:, 7:]
     if body.source:
-        home = source.angles_at_home(body)
-        angles = angles - np.array([home[name] for name in body.joint_names])
-        quaternions = rotations.product(quaternions, rotations.inverse(source.file_orientation(body)))
-        place = source.torso_place(body)
-        positions = positions + (rotations.matrix(quaternions) @ place[:, None])[..., 0]
+        positions, quaternions, angles = _count_from_standing_pose(body, positions, quaternions, angles)
     if loops:
         positions, quaternions, angles, _ = close_loop(positions, quaternions, angles)
-    return values.make(body, Path(path).stem, rate, loops, positions, quaternions, angles)
+    return make(body, Path(path).stem, rate, loops, positions, quaternions, angles)
+
+
+def _check_names(body: Body, columns: Collection[str], expected_names: Sequence[str]) -> None:
+    """Raise ValueError for a column that is missing, or one that the body does not have."""
+    for name in expected_names:
+        if name not in columns:
+            hint = checks.hint(name, columns)
+            raise ValueError(f"columns: expected those of {body.name}, and there is no {name}{hint}{CURE}")
+    for name in columns:
+        if name not in expected_names:
+            hint = checks.hint(name, expected_names)
+            raise ValueError(f"columns: {checks.preview(name)} is no joint of {body.name}{hint}")
+
+
+def _count_from_standing_pose(
+    body: Body, positions: np.ndarray, quaternions: np.ndarray, angles: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return poses of an imported body's own file as the suite has them: of the torso, and from the standing pose.
+
+    Args:
+        body: with a source.
+        positions: (frames, 3) of the root body, m.
+        quaternions: (frames, 4) of the root body.
+        angles: (frames, joints) rad.
+    """
+    home = source.angles_at_home(body)
+    home_angles = np.array([home[name] for name in body.joint_names])
+    torso_quaternions = rotations.product(quaternions, rotations.inverse(source.file_orientation(body)))
+    torso_in_root = source.torso_place(body)
+    offsets = (rotations.matrix(torso_quaternions) @ torso_in_root[:, None])[..., 0]
+    return positions + offsets, torso_quaternions, angles - home_angles
 
 
 def _even_rate(columns: dict[str, np.ndarray]) -> tuple[float, dict[str, np.ndarray]]:
