@@ -27,11 +27,11 @@ import mujoco
 import numpy as np
 from tqdm import tqdm
 
-from arc_suite.animation.clips import bounds, on_ground, planting, weight
+from arc_suite.animation.clips import bounds, on_ground, planting, swaying
 from arc_suite.animation.clips.catalog import CLIPS, WalkLoop
 from arc_suite.animation.clips.clips import FPS, sample_clip
 from arc_suite.animation.clips.drafts import make_drafts
-from arc_suite.animation.clips.from_rest import cut_passage
+from arc_suite.animation.clips.passages import cut_passage
 from arc_suite.animation.clips.recorder import Recorder
 from arc_suite.bodies.families import sound_body
 from arc_suite.envs.setup import Setup
@@ -115,7 +115,7 @@ def measured(body) -> tuple[dict[str, float], dict[str, str]]:
     """Return numbers of the clips of a body by name, and the reasons of those that are left out."""
     recorder, left_out = make_recorder(body), {}
     made = make_drafts(recorder, list(CLIPS), iter, left_out)
-    light = make_drafts(recorder, ["walk", "idle"], iter, {}, character=weight.choose_character(0.0))
+    light = make_drafts(recorder, ["walk", "idle"], iter, {}, character=swaying.choose_character(0.0))
     loops = [draft for name, draft in made.items() if isinstance(CLIPS[name], WalkLoop)]
     found = {"clips": len(CLIPS) - len(left_out), "cycles": max((draft.cycles for draft in loops), default=np.nan)}
     found["broken"] = len(excesses := broken(body, {name: made[name] for name in CLIPS if name not in left_out}))

@@ -15,7 +15,7 @@ import clip_sets
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation.clips import planting, weight
+from arc_suite.animation.clips import planting, swaying
 from arc_suite.animation.clips.drafts import make_drafts
 from arc_suite.envs.setup import Setup
 
@@ -46,7 +46,8 @@ def main(*names: str) -> None:
         recorder, left_out = clip_sets.make_recorder(body), {}
         clips = [*clip_sets.PACES, "start", "stop", *ACTIONS]
         light, heavy = (
-            make_drafts(recorder, clips, iter, left_out, character=weight.choose_character(size)) for size in (0.0, 1.0)
+            make_drafts(recorder, clips, iter, left_out, character=swaying.choose_character(size))
+            for size in (0.0, 1.0)
         )
         lines = []
         for clip in [clip for clip in ("walk", "run") if clip in heavy]:

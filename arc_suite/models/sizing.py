@@ -60,11 +60,6 @@ def sole_clearance(body: Body) -> float:
     return 2.0 * simulation(body).contact_margin
 
 
-def time_unit(body: Body) -> float:
-    """Return the time in which gravity moves a body by about its height, sqrt(h / g), s."""
-    return math.sqrt(body.torso.standing_height / GRAVITY)
-
-
 def natural_frequency(body: Body) -> float:
     """Return the natural frequency of the position control of the body's joints, rad/s."""
     return _FREQUENCY_SHARE / control_timestep(body)

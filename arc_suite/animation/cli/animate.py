@@ -21,7 +21,7 @@ import math
 from absl import flags
 
 from arc_suite.animation import clips as catalog
-from arc_suite.animation.clips import clip_files, weight
+from arc_suite.animation.clips import clip_files, swaying
 from arc_suite.cli.flags import define_walk, only_setup, policy_name, preset_from_flags
 from arc_suite.cli.program import progress
 
@@ -46,7 +46,7 @@ flags.DEFINE_string(
     "weight",
     "1",
     "How much the torso sinks, rolls and pitches in walks, starts and stops: 0 for not at all, to "
-    f"{weight.MAX_WEIGHT:g}; or {', '.join(weight.CHARACTERS)}.",
+    f"{swaying.MAX_WEIGHT:g}; or {', '.join(swaying.CHARACTERS)}.",
 )
 flags.DEFINE_integer(
     "triangles",

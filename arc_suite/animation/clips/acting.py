@@ -13,7 +13,7 @@ from arc_suite.animation.clips.root_motion import ClipMotion, Pose, advance_stra
 from arc_suite.cpg import leaps
 from arc_suite.cpg.drives import drive
 from arc_suite.cpg.selection import presets_of
-from arc_suite.models import sizing
+from arc_suite.models import sizing, standing
 from arc_suite.models.kinematics import Legs
 from arc_suite.models.outline import torso_box
 from arc_suite.models.standing import pose_mechanics, standing_qpos
@@ -122,7 +122,7 @@ def _measure_drift(body: Body, recording: Recording) -> np.ndarray:
     """Return the distance (2,) along x and y between the mean positions of feet at both ends, standing heights."""
     ends = recording.poses[[0, -1]]
     legs = Legs.of(body)
-    soles, _ = legs.soles(legs.by_leg(ends[:, 7:]))  # in the torso's frame
+    soles = legs.sole_positions(legs.by_leg(ends[:, 7:]))  # in the torso's frame
     feet = soles @ rotations.matrix(ends[:, 3:7]).swapaxes(-1, -2) + ends[:, None, :3]
     return (feet[1] - feet[0])[:, :2].mean(axis=0) / body.torso.standing_height
 
@@ -141,7 +141,7 @@ def _check_lies(body: Body, rest: Pose, pose: np.ndarray) -> None:
 
 def _to_steps(body: Body, duration: float) -> int:
     """Return the number of control steps in a multiple of sqrt(h / g)."""
-    seconds = duration * sizing.time_unit(body)
+    seconds = duration * standing.time_unit(body)
     return round(seconds / sizing.control_timestep(body))
 
 
@@ -205,8 +205,8 @@ def _simulate_limp(body: Body, rest: Pose, side: str) -> Recording:
     layout = readings.layout(model, body)
     height = body.torso.standing_height
     leg_mass = model.body_mass.sum() / len(body.legs)  # kg, that a leg carries
-    leg_load = leg_mass * sizing.GRAVITY * height  # N m
-    time_unit = sizing.time_unit(body)
+    leg_load = leg_mass * standing.GRAVITY * height  # N m
+    time_unit = standing.time_unit(body)  # s
     joints = layout.joint_velocities
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
     model.dof_armature[joints] = model.dof_armature[joints].clip(max=_LIMP_ARMATURE * leg_mass * height**2)

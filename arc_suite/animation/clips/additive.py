@@ -9,7 +9,6 @@ from arc_suite.animation.clips.catalog import Difference, WalkLoop, clip_of, is_
 from arc_suite.animation.clips.foot_contacts import sole_heights
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose
 from arc_suite.robots.spec import Body
-from arc_suite.simulation.model import compile_model
 
 _MAX_SOLE_DEPTH = 0.03  # standing heights, that a sole may be below the ground
 _TRIED_PHASES = 4  # of a base loop, in which a clip that is not in step with it begins
@@ -53,7 +52,7 @@ def _measure_sole_depth(
     poses = [
         add_clip(motion, idle, base_motion, base_frames % base_frames_in_loop) for base_frames in tried_base_frames
     ]
-    lowest = float(sole_heights(compile_model(body), body, np.concatenate(poses)).min())  # m
+    lowest = float(sole_heights(body, np.concatenate(poses)).min())  # m
     return -lowest / body.torso.standing_height
 
 

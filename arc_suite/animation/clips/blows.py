@@ -8,8 +8,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.animation.clips import hard_ground
-from arc_suite.models import sizing
-from arc_suite.models.standing import GRAVITY
+from arc_suite.models.standing import time_unit, velocity_unit
 from arc_suite.robots.spec import Body
 
 # By the side that is hit: forward and left components of the blow.
@@ -41,10 +40,10 @@ class Blow(NamedTuple):
     def strike(self, body: Body, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
         """Push the torso for a moment, and return the positions (steps, nq) before each of its steps."""
         height = body.torso.standing_height
-        steps = math.ceil(_DURATION * sizing.time_unit(body) / model.opt.timestep)
+        steps = math.ceil(_DURATION * time_unit(body) / model.opt.timestep)
         torso = model.body("torso").id
         direction = rotations.to_heading_frame(np.array(DIRECTIONS[self.side]), -rotations.yaw(data.xquat[torso]))
-        momentum = self.size * math.sqrt(GRAVITY * height) * model.body_mass.sum()  # N s
+        momentum = self.size * velocity_unit(body) * model.body_mass.sum()  # N s
         force = np.append(direction, 0.0) * momentum / (steps * model.opt.timestep)
         torque = np.cross((0.0, 0.0, self.lever * height), force)
         data.xfrc_applied[torso] = np.concatenate([force, torque])

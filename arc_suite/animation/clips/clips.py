@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import checks, registry
-from arc_suite.animation.clips import additive, bounds, catalog, planting, secondary
-from arc_suite.animation.clips import weight as weights
+from arc_suite.animation.clips import additive, bounds, catalog, planting, secondary, swaying
 from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.drafts import make_drafts
 from arc_suite.animation.clips.foot_contacts import FootContact
@@ -100,7 +99,7 @@ def clips(
         straight: whether loops that do not turn go exactly where their commands say; without it, they veer as the body
             does.
         plant: whether inverse kinematics keeps feet in stance where they are; without it, they slide as in the physics.
-        weight: multiple of the usual weight, from 0 for none to 2; or one of `weight.CHARACTERS`.
+        weight: multiple of the usual weight, from 0 for none to 2; or one of `swaying.CHARACTERS`.
 
     Raises:
         ValueError: no name, an unknown one, a value out of range, a policy that does not fit, or no clip that can be
@@ -110,28 +109,36 @@ def clips(
     checks.number("fps", fps, 1.0, 1000.0)
     checks.boolean("straight", straight)
     checks.boolean("plant", plant)
-    character = weights.choose_character(weight)
+    character = swaying.choose_character(weight)
     names = _check_names(names)
-    has_command = "command" in setup.definition.blocks
-    has_level_ground = not setup.kind.own_arena  # a task without an arena of its own
-    if policy == "cpg" and preset is None and has_command and has_level_ground:
-        preset = next(name for name in _PRESETS if name in presets_of(setup.body))
-    recorder = Recorder(setup, policy, preset)
+    recorder = Recorder(setup, policy, _choose_preset(setup, policy) if preset is None else preset)
     left_out: dict[str, str] = {}
     drafts = make_drafts(recorder, names, progress, left_out, straight, plant, character)
     _report_left_out(setup.body, names, left_out)
-    clip_of_name = {name: sample_clip(name, setup.body, drafts[name], fps) for name in names if name not in left_out}
-    walk = sample_clip("walk", setup.body, drafts["walk"], fps).motion if "walk" in drafts else None
-    for name, clip in clip_of_name.items():
-        swings = secondary.swing(setup.body, catalog.clip_of(name), clip.motion, walk)
-        clip_of_name[name] = clip._replace(swings=swings)
-    motion_of_clip = {name: clip.motion for name, clip in clip_of_name.items()}
-    clip_loops = {name: clip.loops for name, clip in clip_of_name.items()}
-    for name, clip in clip_of_name.items():
+    body = setup.body
+    sampled_names = drafts.keys() & {*names, "walk"}  # starts and stops swing as the walk, even if it is not asked for
+    samples = {name: sample_clip(name, body, drafts[name], fps) for name in sampled_names}
+    walk = samples["walk"].motion if "walk" in samples else None
+    named_clips = {name: samples[name] for name in names if name not in left_out}
+    for name, clip in named_clips.items():
+        swings = secondary.swing(body, catalog.clip_of(name), clip.motion, walk)
+        named_clips[name] = clip._replace(swings=swings)
+    motion_of_clip = {name: clip.motion for name, clip in named_clips.items()}
+    clip_loops = {name: clip.loops for name, clip in named_clips.items()}
+    for name, clip in named_clips.items():
         if catalog.is_additive(name):
-            bases = additive.find_bases(setup.body, name, motion_of_clip, clip_loops, drafts["idle"].start)
-            clip_of_name[name] = clip._replace(additive_over=tuple(bases))
-    return list(clip_of_name.values())
+            bases = additive.find_bases(body, name, motion_of_clip, clip_loops, drafts["idle"].start)
+            named_clips[name] = clip._replace(additive_over=tuple(bases))
+    return list(named_clips.values())
+
+
+def _choose_preset(setup: Setup, policy: str) -> str | None:
+    """Return the preset of a demonstrator for clips; None for the one that suits the task and the body."""
+    has_command = "command" in setup.definition.blocks
+    has_level_ground = not setup.kind.own_arena  # a task without an arena of its own
+    if policy == "cpg" and has_command and has_level_ground:
+        return next(name for name in _PRESETS if name in presets_of(setup.body))
+    return None
 
 
 def _check_names(names: Sequence[str]) -> list[str]:

@@ -15,7 +15,6 @@ from arc_suite.animation.clips.foot_contacts import (
 )
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose
 from arc_suite.robots.spec import Body
-from arc_suite.simulation.model import compile_model
 
 _MAX_SOLE_DEPTH = 0.025  # standing heights, that a sole is below the ground where others are on it
 
@@ -51,7 +50,7 @@ class Draft(NamedTuple):
 
     def stance_height_and_contacts(self, body: Body) -> tuple[float, list[FootContact]]:
         """Return the median height of soles in stance, m, and the foot contact events; none without a gait."""
-        heights = sole_heights(compile_model(body), body, self.motion.poses())
+        heights = sole_heights(body, self.motion.poses())
         if self.stands:
             return float(np.median(heights)), []
         min_rise = MIN_RISE if self.cycles else MIN_RISE_IN_GESTURE
@@ -66,7 +65,7 @@ class Draft(NamedTuple):
 
     def put_on_ground(self, body: Body) -> "Draft":
         """Return the draft with soles in stance on the ground, and none deep in it."""
-        lowest = float(sole_heights(compile_model(body), body, self.motion.poses()).min())
+        lowest = float(sole_heights(body, self.motion.poses()).min())
         stance_height, _ = self.stance_height_and_contacts(body)
         height = min(stance_height, lowest + _MAX_SOLE_DEPTH * body.torso.standing_height)
         return self._replace(motion=self.motion.lower(height))

@@ -37,8 +37,8 @@ from arc_suite.animation.clips.loops import (
 from arc_suite.animation.clips.recorder import GaitRecording, Recorder, TransitionRecording
 from arc_suite.animation.clips.recordings import Recording
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose
+from arc_suite.animation.clips.swaying import USUAL, Character
 from arc_suite.robots.spec import Body
-from arc_suite.simulation.model import compile_model
 
 _MAX_CYCLES_IN_STEP = 4  # gait cycles of loops that stay in step
 _MAX_CYCLES_ALONE = 12  # gait cycles of a loop with a gait of its own
@@ -52,7 +52,7 @@ def make_drafts(
     left_out: MutableMapping[str, str],
     straight: bool = False,
     plant: bool = False,
-    character: weight.Character = weight.USUAL,
+    character: Character = USUAL,
 ) -> dict[str, Draft]:
     """Record what clips need, and return their drafts by name, with those of the clips that they connect to.
 
@@ -194,7 +194,7 @@ def _cut_loops_in_step(
 def _keep_regular_starts(body: Body, recording: Recording, samples: int, cycles: int) -> np.ndarray:
     """Return starts (n,) of loops that close, those in which the fewest feet step other than once a gait cycle."""
     starts = find_starts(recording, samples)
-    heights = sole_heights(compile_model(body), body, recording.poses)
+    heights = sole_heights(body, recording.poses)
     odd_feet = [
         count_odd_feet(heights[start : start + samples], cycles, body.torso.standing_height) for start in starts
     ]

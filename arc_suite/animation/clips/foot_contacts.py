@@ -1,5 +1,6 @@
 """Foot contact events of a motion, from the heights of the feet, as the contacts of the simulation chatter."""
 
+import itertools
 from typing import NamedTuple
 
 import mujoco
@@ -7,7 +8,9 @@ import numpy as np
 
 from arc_suite.animation.clips.root_motion import ClipMotion
 from arc_suite.models.standing import standing_qpos
+from arc_suite.motions.runs import find_runs
 from arc_suite.robots.spec import Body
+from arc_suite.simulation.model import compile_model
 from arc_suite.tasks import readings
 
 TOUCH_DOWN = "touch_down"
@@ -39,14 +42,14 @@ class FootContact(NamedTuple):
     time: float
 
 
-def sole_heights(model: mujoco.MjModel, body: Body, poses: np.ndarray) -> np.ndarray:
+def sole_heights(body: Body, poses: np.ndarray) -> np.ndarray:
     """Return the heights (samples, feet), m, of the feet's lowest points over a level floor.
 
     Args:
-        model: model of the body.
-        body: its spec.
+        body: any body.
         poses: (samples, 7 + joints) in the world.
     """
+    model = compile_model(body)
     data = mujoco.MjData(model)
     foot_ids = [model.body(name).id for name in body.foot_names]
     foot_radii = [leg.foot.radius for leg in body.legs]
@@ -80,12 +83,10 @@ def find_swings(heights: np.ndarray, min_rise: float, bounce: float, loops: bool
     is_up = np.roll(is_up, -begin)
     is_high = np.roll(is_high, -begin)
 
-    starts, ends = _find_runs(is_up)
-    for end, next_start in zip(ends[:-1], starts[1:], strict=True):
+    for (_, end), (next_start, _) in itertools.pairwise(find_runs(is_up)):
         if next_start - end < bounce:
             is_up[end:next_start] = True
-    starts, ends = _find_runs(is_up)
-    for start, end in zip(starts, ends, strict=True):
+    for start, end in find_runs(is_up):
         is_up[start:end] = is_high[start:end].any()
     return np.roll(is_up, begin)
 
@@ -108,8 +109,7 @@ def find_touching(heights: np.ndarray, swings: np.ndarray, near: float, loops: b
     heights = np.roll(heights, -begin)
     swings = np.roll(swings, -begin)
     touches = np.zeros(len(swings), bool)
-    starts, ends = _find_runs(~swings)
-    for start, end in zip(starts, ends, strict=True):
+    for start, end in find_runs(~swings):
         lowest = start + int(heights[start:end].argmin())
         max_height = near
         if heights[lowest] > near:
@@ -173,9 +173,3 @@ def find_foot_contacts(
     swings[sample_count:] = swings[:1]
     contacts.sort(key=lambda contact: (contact.sample, contact.foot, contact.event))
     return contacts, ~swings
-
-
-def _find_runs(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the first sample of each run of true values, and the sample after its last."""
-    edges = np.diff(mask.astype(int), prepend=0, append=0)
-    return np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)

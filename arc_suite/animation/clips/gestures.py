@@ -22,7 +22,8 @@ from arc_suite.animation.clips.standing_legs import (
     pose_motion,
     sample_times,
 )
-from arc_suite.models import posture, sizing
+from arc_suite.models import posture
+from arc_suite.models.standing import time_unit
 from arc_suite.robots.spec import Body
 
 _LEFT = posture.POSE_NAMES.index("left")
@@ -213,7 +214,7 @@ def strike(body: Body, rest: Pose) -> ClipMotion:
     Raises:
         ValueError: the legs leave no room for it.
     """
-    seconds = _STRIKE_DURATION * sizing.time_unit(body)
+    seconds = _STRIKE_DURATION * time_unit(body)
     haste = max(1.0, seconds / _MAX_STRIKE_SECONDS)
     times = haste * sample_times(body, _STRIKE_DURATION / haste)  # of the tracks
     feet = feet_from_torso(body, rest)

@@ -1,22 +1,27 @@
-"""Where a drawn body is over the ground in a motion: heights, flights, and how far standing feet slide."""
+"""Where a drawn body is over the ground in a motion: heights, flights, slides of feet; and motions raised out of it."""
 
 import functools
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from arc_suite import rotations
 from arc_suite.animation.clips.bones import pose_parts
 from arc_suite.animation.clips.meshes import body_meshes
-from arc_suite.animation.clips.root_motion import ClipMotion, Pose
+from arc_suite.animation.clips.root_motion import ClipMotion, Pose, fade_out
 from arc_suite.animation.parts import Part, describe_body, part_frames
+from arc_suite.models.standing import time_unit
+from arc_suite.motions.runs import find_runs
 from arc_suite.robots.spec import Body
 
 MAX_SLIDE = 0.05  # standing heights, of a standing foot of a leg with three joints or more
 _FOOT_SIZE = 2.0  # radii of a foot about its center, in which the end of its leg is a part of it
 _STANCE_HEIGHT = 0.01  # standing heights: a lower sole stands
 _FLIGHT_HEIGHT = 0.02  # standing heights: while all soles are higher, a body flies
+_MAX_SOLE_DEPTH = 0.025  # standing heights: a body with soles that are deeper in the ground is raised
+_RAISING_DURATION = 0.5  # sqrt(h / g), to either side of a sample in which a body is raised
 
 
 class Ground(NamedTuple):
@@ -73,10 +78,35 @@ def measure_slide(body: Body, ground: Ground) -> float:
     is_low = ground.soles < _STANCE_HEIGHT * body.torso.standing_height
     largest = 0.0
     for foot_is_low, ways in zip(is_low.T, ground.feet.swapaxes(0, 1), strict=True):
-        edges = np.flatnonzero(np.diff(foot_is_low.astype(int), prepend=0, append=0)).reshape(-1, 2)
-        for start, end in edges:
+        for start, end in find_runs(foot_is_low):
             largest = max(largest, float(np.linalg.norm(np.ptp(ways[start:end], axis=0))))
     return largest
+
+
+def raise_out_of_ground(body: Body, motion: ClipMotion, fixed_ends: Sequence[int]) -> ClipMotion:
+    """Return a motion whose torso is higher where, drawn, the body is in the ground, and smoothly so before and after.
+
+    Contacts of the physics are soft, and recordings of policies have no contacts of what is drawn around colliders.
+
+    Args:
+        body: the spec.
+        motion: any.
+        fixed_ends: ends whose poses stay: 0, -1 or both.
+    """
+    height = body.torso.standing_height
+    ground = measure_ground(body, motion)
+    depths = np.maximum(-ground.lowest_part, -ground.soles.min(axis=-1) - _MAX_SOLE_DEPTH * height)
+    if depths.max() <= 0.0:
+        return motion
+    width = round(_RAISING_DURATION * time_unit(body) / motion.time_step)  # samples to either side
+    padded_depths = np.pad(depths.clip(0.0), 2 * width, mode="edge")
+    largest_depths = sliding_window_view(padded_depths, 2 * width + 1).max(axis=-1)
+    window = np.hanning(2 * width + 3)[1:-1]
+    raises = np.convolve(largest_depths, window / window.sum(), "valid")
+    growth = fade_out(1.0 - np.arange(len(raises)) / width)  # from 0 at the first sample
+    for end in fixed_ends:
+        raises = raises * (growth if end == 0 else growth[::-1])
+    return motion._replace(positions=motion.positions + raises[:, None] * (0.0, 0.0, 1.0))
 
 
 @functools.lru_cache(maxsize=8)

@@ -9,6 +9,7 @@ from arc_suite.animation.clips.root_motion import ClipMotion, fade_out
 from arc_suite.animation.clips.standing_legs import FOOT_WEIGHTS
 from arc_suite.models.kinematics import Legs
 from arc_suite.motions.ground_poses import integrate_twist
+from arc_suite.motions.runs import find_runs
 from arc_suite.robots.spec import Body
 
 _STANCE_HEIGHT = 0.01  # standing heights: a lower sole is in stance
@@ -80,7 +81,7 @@ def _foot_positions(legs: Legs, motion: ClipMotion) -> np.ndarray:
     poses = motion.poses()
     torso_positions = poses[:, None, :3]
     torso_rotations = rotations.matrix(poses[:, 3:7])[:, None]
-    feet, _ = legs.to_foot_centers().soles(legs.by_leg(motion.joints))  # in the torso's frame
+    feet = legs.foot_centers(legs.by_leg(motion.joints))  # in the torso's frame
     return (torso_rotations @ feet[..., None])[..., 0] + torso_positions
 
 
@@ -125,10 +126,8 @@ def _find_stances(is_low: np.ndarray, min_swing: int, max_stance: int | None) ->
         min_swing: samples; a shorter swing does not end a stance.
         max_stance: samples; stances of so many samples or more are left out. None for no limit.
     """
-    # Where the foot becomes low, and where it no longer is, in turn.
-    edges = np.flatnonzero(np.diff(is_low.astype(int), prepend=0, append=0)).reshape(-1, 2)
     stances: list[tuple[int, int]] = []
-    for start, end in edges.tolist():
+    for start, end in find_runs(is_low).tolist():
         if stances and start - stances[-1][1] < min_swing:
             stances[-1] = (stances[-1][0], end)
         else:
@@ -196,7 +195,7 @@ def _solve_joint_angles(
         goals[..., 2] = np.maximum(goals[..., 2], legs.radii[unsolved])
         goals_in_torso = (torso_rotations.swapaxes(-1, -2) @ (goals - torso_positions)[..., None])[..., 0]
         candidates = _bring_near(centers, start_angles[:, unsolved], goals_in_torso, _DAMPING * standing_height)
-        misses_in_torso = centers.soles(candidates)[0] - goals_in_torso
+        misses_in_torso = centers.foot_centers(candidates) - goals_in_torso
         height_misses = abs((torso_rotations @ misses_in_torso[..., None])[..., 2, 0]).max(axis=0)
         is_near = height_misses <= _MAX_SINK * standing_height
         is_slow = _largest_joint_steps(candidates) <= max_joint_steps[unsolved]

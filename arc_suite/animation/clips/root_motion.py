@@ -8,6 +8,7 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.animation.clips.recordings import Recording
 from arc_suite.motions.ground_poses import compose, ground_poses, relative_pose, twist_to
+from arc_suite.motions.sampling import sample_linearly
 
 _MIN_DIVISOR = 1e-9  # of values and paths that may be 0 throughout, and stay 0
 
@@ -96,18 +97,12 @@ class ClipMotion(NamedTuple):
 
     def sample_at(self, times: np.ndarray) -> "ClipMotion":
         """Return the motion at even times (frames,), s, interpolated between samples."""
-        sample_count = len(self.joints)
-        fractional_samples = (np.asarray(times) / self.time_step).clip(0.0, sample_count - 1)
-        previous = np.minimum(fractional_samples.astype(int), sample_count - 2)
-        share = (fractional_samples - previous)[:, None]
-
-        def interpolate(values):
-            return (1.0 - share) * values[previous] + share * values[previous + 1]
-
-        motion = self.map_arrays(interpolate)  # samples are 2 ms apart: a straight line is as good as an arc
+        places = (np.asarray(times) / self.time_step).clip(0.0, len(self.joints) - 1)  # fractions of samples
+        # Samples are 2 ms apart: a straight line is as good as an arc.
+        motion = self.map_arrays(lambda values: sample_linearly(values, places))
         return motion._replace(
             time_step=float(times[1] - times[0]),
-            root=interpolate(self.root),
+            root=sample_linearly(self.root, places),
             quaternions=motion.quaternions / np.linalg.norm(motion.quaternions, axis=-1, keepdims=True),
         )
 

@@ -4,7 +4,6 @@ Lengths are in standing heights h, times in sqrt(h / g). Numbers of the torso's 
 """
 
 import itertools
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +13,7 @@ from arc_suite.animation.clips.root_motion import ClipMotion, Pose, share_of_lar
 from arc_suite.models import posture, sizing
 from arc_suite.models.kinematics import Legs
 from arc_suite.models.outline import torso_box
+from arc_suite.models.standing import rate_unit
 from arc_suite.robots.spec import Body
 
 HEIGHT = posture.POSE_NAMES.index("height")
@@ -131,13 +131,13 @@ def move_legs_in_stages(
     legs = Legs.of(body, used=1.0).to_foot_centers()
     angles = legs.by_leg(joints)
     legs = legs.widen_ranges(angles)
-    feet = legs.soles(angles)[0] @ attitudes.swapaxes(-1, -2)  # m, from the torso, along the root's axes
+    feet = legs.foot_centers(angles) @ attitudes.swapaxes(-1, -2)  # m, from the torso, along the root's axes
     displacements = standing_height * lifts
     for share in np.linspace(0.0, 1.0, stages + 1)[1:]:
         moved_feet = posture.move_ground_points(feet + share * displacements, share * poses, standing_height)
         goals = moved_feet @ attitudes
         angles = legs.solve_joint_angles(angles, goals, FOOT_WEIGHTS, posture.IK_DAMPING * standing_height, iterations)
-    return LegMotion(joints=legs.by_joint(angles), misses=legs.soles(angles)[0] - goals)
+    return LegMotion(joints=legs.by_joint(angles), misses=legs.foot_centers(angles) - goals)
 
 
 def follow_at_largest_size(
@@ -210,7 +210,7 @@ def follow_exactly(
     standing_height = body.torso.standing_height
     joints, misses = keep_feet_in_place(body, rest, poses, lifts)
     joints = _smooth(joints, smoothing_rounds)
-    max_joint_step = _MAX_JOINT_SPEED * math.sqrt(sizing.GRAVITY / standing_height) * time_step(body)
+    max_joint_step = _MAX_JOINT_SPEED * rate_unit(body) * time_step(body)
     if abs(np.diff(joints, axis=0)).max() > max_joint_step or not _feet_stay(body, misses, lifts):
         return None
     motion = pose_motion(body, rest, poses, joints)
@@ -230,8 +230,8 @@ def _feet_stay(body: Body, misses: np.ndarray, lifts: np.ndarray) -> bool:
 
 def _measure_depth(body: Body, motion: ClipMotion) -> float:
     """Return how deep a foot sinks below its height in the first sample, m."""
-    legs = Legs.of(body, used=1.0).to_foot_centers()
-    feet, _ = legs.soles(legs.by_leg(motion.joints))  # in the torso's frame
+    legs = Legs.of(body, used=1.0)
+    feet = legs.foot_centers(legs.by_leg(motion.joints))  # in the torso's frame
     up = rotations.matrix(motion.quaternions)[:, 2]  # (samples, 3) the vertical in this frame
     heights = motion.positions[:, [2]] + (feet @ up[..., None])[..., 0]  # (samples, legs)
     return float((heights[0] - heights).max())
@@ -285,9 +285,8 @@ def hold_pose(pose: Pose, samples: int, time_step: float) -> ClipMotion:
 
 def feet_from_torso(body: Body, rest: Pose) -> np.ndarray:
     """Return the positions (legs, 3) of the feet from the torso, in the root's axes, m."""
-    legs = Legs.of(body, used=1.0).to_foot_centers()
-    foot_positions, _ = legs.soles(legs.by_leg(rest.joints))
-    return foot_positions @ rotations.matrix(rest.quaternion).T
+    legs = Legs.of(body, used=1.0)
+    return legs.foot_centers(legs.by_leg(rest.joints)) @ rotations.matrix(rest.quaternion).T
 
 
 def time_step(body: Body) -> float:
@@ -297,7 +296,7 @@ def time_step(body: Body) -> float:
 
 def sample_times(body: Body, duration: float) -> np.ndarray:
     """Return the times (samples,) of a duration, both in sqrt(h / g), both ends included."""
-    step = time_step(body) * math.sqrt(sizing.GRAVITY / body.torso.standing_height)
+    step = time_step(body) * rate_unit(body)
     return np.linspace(0.0, duration, 1 + max(2, round(duration / step)))
 
 

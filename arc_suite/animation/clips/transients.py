@@ -14,7 +14,8 @@ from arc_suite.animation.clips.catalog import Passage
 from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.foot_contacts import TOUCH_DOWN
 from arc_suite.animation.clips.root_motion import fade_out
-from arc_suite.models import posture, sizing
+from arc_suite.models import posture
+from arc_suite.models.standing import time_unit
 from arc_suite.robots.spec import Body
 
 
@@ -78,7 +79,7 @@ def _make_poses(body, draft: Draft, transient: _Transient, begin: int, end: int,
     poses = np.zeros((samples, 6))
     anticipation = np.zeros(samples)
     anticipation[:begin] = np.sin(np.pi * np.arange(begin) / max(begin, 1)) ** 2
-    times = np.arange(samples - end) * draft.motion.time_step / sizing.time_unit(body)
+    times = np.arange(samples - end) * draft.motion.time_step / time_unit(body)
     swing = np.zeros(samples)
     swing[end:] = np.exp(-damping * frequency * times) * np.sin(np.sqrt(1.0 - damping**2) * frequency * times)
     swing[end:] *= 1.0 - fade_out(np.linspace(1.0, 0.0, samples - end) / _SETTLING_SHARE)

@@ -6,7 +6,7 @@ import numpy as np
 
 from arc_suite.animation.clips import standing_legs
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose, fade_out
-from arc_suite.models import sizing
+from arc_suite.models.standing import time_unit
 from arc_suite.robots.spec import Body
 
 # The duration of a turn is that of its start and stop, and a time for its angle, at most a time in s.
@@ -49,9 +49,8 @@ def turn(body: Body, rest: Pose, angle: float) -> ClipMotion:
 
 def _find_duration(body: Body, angle: float) -> float:
     """Return the duration of a turn, sqrt(h / g)."""
-    time_unit = sizing.time_unit(body)  # s
     half_turns = abs(angle) / math.pi
-    max_duration = _MAX_SECONDS_OF_HALF_TURN * max(1.0, half_turns) / time_unit
+    max_duration = _MAX_SECONDS_OF_HALF_TURN * max(1.0, half_turns) / time_unit(body)
     return min(_ENDS_DURATION + half_turns * _HALF_TURN_DURATION, max_duration)
 
 

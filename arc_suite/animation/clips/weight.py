@@ -1,45 +1,40 @@
 """Weight: the torso of walks, starts and stops moves as on a damped spring, and feet stay where they were.
 
-In a gait the torso sinks after touchdowns, twice a cycle, and rolls towards the feet that stand. The faster it is than
-a walk, the more it sinks, and leans ahead. It banks in turns, and pitches into the acceleration of starts and stops. It
-moves back before a start, a jump and a strike, and swings on after a stop, a landing and a strike; see `transients`.
-Legs follow by inverse kinematics about the feet of each sample. What they do not allow is made smaller. The sway of a
-gait is a function of its phase, and all else is 0 at both ends of a clip. So loops close and clips connect as without
-weight.
+The torso sways in a gait, see `swaying`, and pitches into the acceleration of starts and stops. It moves back before a
+start, a jump and a strike, and swings on after a stop, a landing and a strike; see `transients`. Legs follow by inverse
+kinematics about the feet of each sample. What they do not allow is made smaller.
+
+Loops close and clips connect as without weight: the sway depends on the phase of the gait alone, and all other offsets
+are 0 at both ends of a clip.
 
 Lengths are in standing heights h, times in sqrt(h / g).
 """
 
 import itertools
-import math
 from collections.abc import Mapping
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import checks, rotations
+from arc_suite import rotations
 from arc_suite.animation.clips import bounds, planting, transients
 from arc_suite.animation.clips.catalog import Acted, Kind, Passage, WalkLoop, clip_of
 from arc_suite.animation.clips.draft import Draft
-from arc_suite.animation.clips.foot_contacts import TOUCH_DOWN, find_foot_contacts, sole_heights
 from arc_suite.animation.clips.root_motion import ClipMotion, fade_out, share_of_largest
 from arc_suite.animation.clips.standing_legs import (
-    HEIGHT,
     TRIED_SHARES,
     has_free_feet,
     lower_poses,
     move_legs_in_stages,
     move_torso,
 )
-from arc_suite.models import posture, sizing
+from arc_suite.animation.clips.swaying import MAX_TILT, Character, Sway, find_sway, loop_phases
+from arc_suite.models import posture
 from arc_suite.models.kinematics import Legs
+from arc_suite.models.standing import GRAVITY
 from arc_suite.robots.gaits import PACES
 from arc_suite.robots.spec import Body
-from arc_suite.simulation.model import compile_model
 
-MAX_WEIGHT = 2.0
-
-_ROLL = posture.POSE_NAMES.index("roll")
 _PITCH = posture.POSE_NAMES.index("pitch")
 
 # The largest share of the sway that legs can follow is taken, with a torso that sinks least: stretched legs cannot
@@ -49,13 +44,7 @@ _PITCH_SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
 _DIPS = (0.0, 0.06)  # h, further, while a body pitches in a start or a stop
 _SINKS_OF_RUN = (*_SINKS, -0.05, -0.1)  # h: a body with knees that are folded as far as they go rises
 _LEAN_SINKS = (0.0, 0.05, 0.1, 0.15, -0.025, -0.05, -0.1)  # h, further, of a body that leans
-_BOB_OF_RUN = 2.3  # times that of a walk
-_MAX_TILT = np.radians(8.0)  # rad, of the pitch in starts and stops, and of the bank
 
-# In a trot diagonal feet stand, and as many on the left as on the right. The body rolls to the side of its front feet.
-_FRONT_SHARE = 0.3  # by which the foremost feet count more than those in the middle, in the side that stands
-_MIN_COHERENCE = 0.2  # of touchdowns in half a cycle: below, that of the first foot, at phase 0, sets the phase
-_MIN_SIDE = 0.001  # of the sum of all distances of feet from the middle: below, the first foot sets the side
 _GROWTH_CYCLES = 1.5  # in which the sway grows in a start, and fades in a stop
 _FADE_CYCLES = 0.5  # at either end, in which the pitch of a start or a stop fades
 
@@ -70,106 +59,6 @@ _MAX_SWING_MISS = 0.08  # h
 _MAX_MORE_SLIP = 0.02  # m a meter, that a loop has more than without weight
 _MAX_SPEED_RATIO = 1.5  # of the fastest joint, with and without weight
 _MAX_SPEED_RATIO_OF_RUN = 2.0
-
-
-class Character(NamedTuple):
-    """How a body carries its weight.
-
-    Attributes:
-        bob: range of the torso's height in a gait, h.
-        roll: amplitude of its roll in a gait, rad.
-        pitch: rad, for an acceleration of g.
-        bank: share of the roll at which weight acts along the torso's vertical in a turn.
-        lean: pitch ahead in a run, rad.
-        frequency: frequency of the spring, rad / sqrt(h / g).
-        damping: damping ratio of the spring.
-        amplitude: multiple of all offsets of the torso.
-    """
-
-    bob: float
-    roll: float
-    pitch: float
-    bank: float
-    lean: float
-    frequency: float
-    damping: float
-    amplitude: float = 1.0
-
-    def response(self, body: Body, frequencies):
-        """Return what a path is multiplied by, at frequencies in rad/s, where the spring follows it; complex."""
-        ratio = frequencies * sizing.time_unit(body) / self.frequency
-        return 1.0 / (1.0 - ratio**2 + 2.0j * self.damping * ratio)
-
-    def direction(self, body: Body, frequency: float) -> complex:
-        """Return the response at a frequency, rad/s, without its size: a delay."""
-        response = self.response(body, frequency)
-        return response / abs(response)
-
-    def follow(self, body: Body, path: np.ndarray, time_step: float) -> np.ndarray:
-        """Return how the spring follows a path (samples,) from rest."""
-        padded = 4 * len(path)  # samples, so that the end does not act on the start
-        frequencies = 2.0 * np.pi * np.fft.rfftfreq(padded, time_step)
-        spectrum = np.fft.rfft(path, padded) * self.response(body, frequencies)
-        return np.fft.irfft(spectrum, padded)[: len(path)]
-
-
-USUAL = Character(bob=0.035, roll=0.03, pitch=0.9, bank=1.0, lean=0.14, frequency=5.0, damping=0.5)
-CHARACTERS = {
-    "heavy": Character(bob=0.05, roll=0.045, pitch=1.2, bank=0.7, lean=0.12, frequency=3.5, damping=0.4),
-    "nervous": Character(bob=0.025, roll=0.02, pitch=1.1, bank=1.5, lean=0.17, frequency=9.0, damping=0.3),
-    "old": Character(bob=0.03, roll=0.06, pitch=0.6, bank=0.3, lean=0.07, frequency=4.0, damping=0.9),
-}
-
-
-class Sway(NamedTuple):
-    """Offsets of the torso in a gait. Complex numbers are amplitudes over the phase of the gait.
-
-    Attributes:
-        bob: amplitude of the height, twice a cycle, h.
-        roll: amplitude of the roll, once a cycle, rad.
-        bank: roll that stays, rad.
-        lean: pitch that stays, rad; as much of it as legs allow is added to the rest.
-        sink: height by which the torso is lower, h.
-    """
-
-    bob: complex
-    roll: complex
-    bank: float
-    lean: float = 0.0
-    sink: float = 0.0
-
-    def scale(self, factor: float, sink: float = 0.0) -> Self:
-        """Return a multiple of the sway, of a torso that sinks."""
-        return self._replace(
-            bob=factor * self.bob,
-            roll=factor * self.roll,
-            bank=factor * self.bank,
-            lean=factor * self.lean,
-            sink=sink,
-        )
-
-    def poses(self, phases: np.ndarray) -> np.ndarray:
-        """Return offsets (samples, 6) at phases (samples,), in cycles, without the lean; see `posture`.
-
-        The torso is never higher, unless its sink is negative.
-        """
-        turns = np.exp(2.0j * np.pi * phases)
-        poses = np.zeros((len(phases), 6))
-        poses[:, HEIGHT] = (self.bob * turns**2).real - abs(self.bob) - self.sink
-        poses[:, _ROLL] = (self.roll * turns).real + self.bank
-        return poses
-
-
-def choose_character(weight: float | str) -> Character:
-    """Return the character of a name, or a multiple of the usual one.
-
-    Raises:
-        ValueError: neither a name nor a number from 0 to `MAX_WEIGHT`.
-    """
-    if not isinstance(weight, str):
-        return USUAL._replace(amplitude=checks.number("weight", weight, 0.0, MAX_WEIGHT))
-    name = checks.name(weight, CHARACTERS, "weight", descriptions=(f"a number from 0 to {MAX_WEIGHT:g}",))
-    return CHARACTERS[name]
 
 
 def add_weight(body: Body, drafts: Mapping[str, Draft], character: Character) -> dict[str, Draft]:
@@ -189,7 +78,7 @@ def add_weight(body: Body, drafts: Mapping[str, Draft], character: Character) ->
             weighted_drafts[name] = _weigh_action(body, name, draft, character)
         if isinstance(clip, WalkLoop):
             passages = _plan_passages(body, drafts, character) if name == "walk" else {}
-            weighted_drafts |= _weigh_gait(body, name, clip, draft, passages, character)
+            weighted_drafts |= _weigh_gait(body, _ConnectedGait(name, clip, draft, passages), character)
     return weighted_drafts
 
 
@@ -201,7 +90,9 @@ def _weigh_action(body: Body, name: str, draft: Draft, character: Character) -> 
     clip = clip_of(name)
     for share in TRIED_SHARES:
         poses = share * character.amplitude * transient
-        weighted_draft = _move_torso(body, clip, draft, poses) if _can_follow(body, clip, draft, poses) else None
+        if not _can_follow(body, clip, draft, poses):
+            continue
+        weighted_draft = _move_torso(body, clip, draft, poses)
         if weighted_draft is not None:
             return weighted_draft._replace(weight=share)
     return draft._replace(weight=0.0)
@@ -222,6 +113,27 @@ class _ConnectedPassage(NamedTuple):
     clip: Passage
     draft: Draft
     transient: np.ndarray
+
+
+class _ConnectedGait(NamedTuple):
+    """A loop of a gait, with the starts and stops that connect to it.
+
+    Attributes:
+        name: name of the loop.
+        clip: clip of the loop.
+        loop: its draft, without weight.
+        passages: starts and stops by name; only the walk has some.
+    """
+
+    name: str
+    clip: WalkLoop
+    loop: Draft
+    passages: Mapping[str, _ConnectedPassage]
+
+    @property
+    def drafts(self) -> dict[str, Draft]:
+        """Drafts of all its clips, by name, without weight."""
+        return {self.name: self.loop} | {name: passage.draft for name, passage in self.passages.items()}
 
 
 class _Movement(NamedTuple):
@@ -254,65 +166,47 @@ def _follow_acceleration(body: Body, clip: Passage, draft: Draft, character: Cha
     motion = draft.motion
     velocities = np.gradient(motion.root[:, :2], motion.time_step, axis=0)
     speed = rotations.to_heading_frame(velocities, motion.root[:, 2])[:, 0]
-    pitch = character.pitch / sizing.GRAVITY * np.gradient(speed, motion.time_step)
-    lowest, highest = (0.0, _MAX_TILT) if clip.starts else (-_MAX_TILT, 0.0)
+    pitch = character.pitch / GRAVITY * np.gradient(speed, motion.time_step)
+    lowest, highest = (0.0, MAX_TILT) if clip.starts else (-MAX_TILT, 0.0)
     cycles = _cycles(draft)
     away_from_ends = (1.0 - fade_out(cycles / _FADE_CYCLES)) * (1.0 - fade_out(cycles[::-1] / _FADE_CYCLES))
     return character.amplitude * away_from_ends * character.follow(body, pitch.clip(lowest, highest), motion.time_step)
 
 
-def _weigh_gait(
-    body: Body,
-    name: str,
-    clip: WalkLoop,
-    loop: Draft,
-    passages: Mapping[str, _ConnectedPassage],
-    character: Character,
-) -> dict[str, Draft]:
-    """Return a loop, and the starts and stops that connect to it, with the largest sway that all of them can follow."""
-    drafts = {name: loop} | {passage_name: passage.draft for passage_name, passage in passages.items()}
-    full_sway = find_sway(body, loop, character, _measure_haste(clip))
-    # A body that follows no share at all is known at once by the smallest.
-    shares = TRIED_SHARES if _plan_gait(body, name, loop, passages, full_sway, TRIED_SHARES[-1]) else ()
-    for share in shares:
-        plan = _plan_gait(body, name, loop, passages, full_sway, share)
-        weighted_drafts = _follow_plan(body, drafts, plan)
+def _weigh_gait(body: Body, gait: _ConnectedGait, character: Character) -> dict[str, Draft]:
+    """Return the drafts of a gait, by name, with the largest sway that all of them can follow."""
+    full_sway = find_sway(body, gait.loop, character, _measure_haste(gait.clip))
+    can_sway = bool(_plan_gait(body, gait, full_sway, TRIED_SHARES[-1]))  # else larger shares are not tried
+    for share in TRIED_SHARES if can_sway else ():
+        plan = _plan_gait(body, gait, full_sway, share)
+        weighted_drafts = _follow_plan(body, gait.drafts, plan)
         if not weighted_drafts:
             continue
         if full_sway.lean:
-            leaning_loop = _lean_ahead(body, clip, loop, plan[name].poses, full_sway.lean)
+            leaning_loop = _lean_ahead(body, gait.clip, gait.loop, plan[gait.name].poses, full_sway.lean)
             if leaning_loop is not None:
-                weighted_drafts[name] = leaning_loop._replace(weight=share)
+                weighted_drafts[gait.name] = leaning_loop._replace(weight=share)
         return weighted_drafts
-    return {clip_name: draft._replace(weight=0.0) for clip_name, draft in drafts.items()}
+    return {name: draft._replace(weight=0.0) for name, draft in gait.drafts.items()}
 
 
-def _plan_gait(
-    body: Body, name: str, loop: Draft, passages: Mapping[str, _ConnectedPassage], full_sway: Sway, share: float
-) -> dict[str, _Movement]:
-    """Return movements of a loop and its passages with a share of the sway, by name; none if legs cannot follow."""
+def _plan_gait(body: Body, gait: _ConnectedGait, full_sway: Sway, share: float) -> dict[str, _Movement]:
+    """Return movements of a gait's clips with a share of the sway, by name; none if legs cannot follow."""
     sinks = _SINKS_OF_RUN if full_sway.lean else _SINKS
     for sink in sinks:
-        plan = _plan_with_sway(body, name, loop, passages, full_sway.scale(share, sink), share)
-        if plan:
+        sway = full_sway.scale(share, sink)
+        loop_poses = sway.poses(loop_phases(gait.loop))
+        if not _can_follow(body, gait.clip, gait.loop, loop_poses):
+            continue
+        plan = {gait.name: _Movement(loop_poses, share)}
+        for name, passage in gait.passages.items():
+            movement = _plan_passage(body, passage, sway)
+            if movement is None:
+                break
+            plan[name] = movement
+        else:
             return plan
     return {}
-
-
-def _plan_with_sway(
-    body: Body, name: str, loop: Draft, passages: Mapping[str, _ConnectedPassage], sway: Sway, share: float
-) -> dict[str, _Movement]:
-    """Return movements of a loop and its passages with a sway, by name; none if legs cannot follow one of them."""
-    loop_poses = sway.poses(_loop_phases(loop))
-    if not _can_follow(body, clip_of(name), loop, loop_poses):
-        return {}
-    plan = {name: _Movement(loop_poses, share)}
-    for passage_name, passage in passages.items():
-        movement = _plan_passage(body, passage, sway)
-        if movement is None:
-            return {}
-        plan[passage_name] = movement
-    return plan
 
 
 def _plan_passage(body: Body, passage: _ConnectedPassage, sway: Sway) -> _Movement | None:
@@ -323,8 +217,12 @@ def _plan_passage(body: Body, passage: _ConnectedPassage, sway: Sway) -> _Moveme
     """
     clip, draft, transient = passage
     cycles = _cycles(draft)
-    cycles_from_rest = cycles if clip.starts else cycles[::-1]
-    phases = cycles - cycles[-1] if clip.starts else cycles  # 0 where it meets the walk
+    if clip.starts:
+        cycles_from_rest = cycles
+        phases = cycles - cycles[-1]  # 0 where it meets the walk
+    else:
+        cycles_from_rest = cycles[::-1]
+        phases = cycles
     growth = 1.0 - fade_out(cycles_from_rest / _GROWTH_CYCLES)
     poses = growth[:, None] * sway.poses(phases)
     if not _can_follow(body, clip, draft, poses):
@@ -367,13 +265,7 @@ def _cycles(draft: Draft) -> np.ndarray:
     return np.arange(len(draft.motion.joints)) * draft.motion.time_step / draft.cycle
 
 
-def _loop_phases(loop: Draft) -> np.ndarray:
-    """Return the phases (samples,) of a loop, cycles; that of the last sample is that of the first."""
-    intervals = len(loop.motion.joints) - 1
-    return loop.cycles / intervals * (np.arange(intervals + 1) % intervals)
-
-
-# The sway of a gait.
+# Legs.
 
 
 def _measure_haste(clip: Kind) -> float:
@@ -383,72 +275,8 @@ def _measure_haste(clip: Kind) -> float:
     return float(np.clip((clip.pace.speed - 1.0) / (PACES["run"].speed - 1.0), 0.0, 1.0))
 
 
-def find_sway(body: Body, loop: Draft, character: Character, haste: float) -> Sway:
-    """Return the offsets with which the torso of a loop moves as its character says.
-
-    The range of the height is that of the character, what the loop has included.
-
-    Args:
-        body: the spec.
-        loop: loop of a gait.
-        character: how the body carries its weight.
-        haste: 0 for a walk, 1 for a run.
-    """
-    heights = sole_heights(compile_model(body), body, loop.motion.poses())
-    contacts, stance = find_foot_contacts(loop.motion, body, heights, loop.cycle, loops=True)
-    touchdowns = [contact.sample for contact in contacts if contact.event == TOUCH_DOWN]
-    sway = Sway(
-        bob=_find_bob(body, loop, touchdowns, character, haste),
-        roll=_find_roll(body, loop, stance, character),
-        bank=_find_bank(loop, character),
-        lean=haste * character.lean,
-    )
-    return sway.scale(character.amplitude)
-
-
-def _find_bob(body: Body, loop: Draft, touchdowns: list[int], character: Character, haste: float) -> complex:
-    """Return the amplitude of the height, twice a cycle, h: the torso falls after touchdowns, given as samples."""
-    phases = _loop_phases(loop)[:-1]
-    # Numbers that turn back twice a cycle: the mean of a path times these is a half of its amplitude at that frequency.
-    turns = np.exp(-4.0j * np.pi * phases)
-    fall = _direction(turns[touchdowns].sum(), _MIN_COHERENCE * len(touchdowns), default=1.0)
-    growth = 1.0 + haste * (_BOB_OF_RUN - 1.0)
-    frequency = 4.0 * np.pi / loop.cycle  # rad/s
-    full_bob = -0.5 * growth * character.bob * fall * character.direction(body, frequency)
-    present_bob = 2.0 * (loop.motion.positions[:-1, 2] * turns).mean()
-    return full_bob - present_bob / body.torso.standing_height
-
-
-def _find_roll(body: Body, loop: Draft, stance: np.ndarray, character: Character) -> complex:
-    """Return the amplitude of the roll, once a cycle, rad: the torso falls to the side of its feet in stance."""
-    x, y = np.array([leg.mount[:2] for leg in body.legs]).T
-    distances = y * (1.0 + _FRONT_SHARE * share_of_largest(x))  # to the left of the middle
-    turns = np.exp(-2.0j * np.pi * _loop_phases(loop)[:-1])  # once a cycle, see `_find_bob`
-    side_of_first_foot = float(np.sign(y[0]))  # it touches down at phase 0
-    side = _direction(
-        ((stance[:-1] @ distances) * turns).mean(), _MIN_SIDE * abs(distances).sum(), default=side_of_first_foot
-    )
-    frequency = 2.0 * np.pi / loop.cycle  # rad/s
-    return -character.roll * side * character.direction(body, frequency)
-
-
-def _find_bank(loop: Draft, character: Character) -> float:
-    """Return the roll that stays in a turn, rad."""
-    forward, _, turning = loop.motion.twist
-    bank = -character.bank * math.atan(forward * turning / sizing.GRAVITY)
-    return float(np.clip(bank, -_MAX_TILT, _MAX_TILT))
-
-
-def _direction(number: complex, least: float, default: complex) -> complex:
-    """Return a complex number of size 1 in the direction of another; a default where that is small."""
-    return number / abs(number) if abs(number) > least else default
-
-
-# Legs.
-
-
 def _can_follow(body: Body, clip: Kind, draft: Draft, poses: np.ndarray) -> bool:
-    """Return whether legs follow offsets (samples, 6) of the torso within their bounds, by some of the samples."""
+    """Return whether legs follow offsets (samples, 6) of the torso within their bounds, by few of the samples."""
     intervals = len(poses) - 1
     samples = np.linspace(0, intervals, intervals // _SEARCH_STRIDE + 1).round().astype(int)
     motion = draft.motion.map_arrays(lambda values: values[samples])
@@ -483,7 +311,7 @@ def _move_torso(body: Body, clip: Kind, draft: Draft, poses: np.ndarray) -> Draf
 def _find_max_misses(body: Body, motion: ClipMotion) -> np.ndarray:
     """Return by how much feet may miss their places (samples, legs), h: in swing more than in stance."""
     legs = Legs.of(body, used=1.0)
-    feet, _ = legs.to_foot_centers().soles(legs.by_leg(motion.joints))  # in the torso's frame
+    feet = legs.foot_centers(legs.by_leg(motion.joints))  # in the torso's frame
     feet_from_torso = feet @ rotations.matrix(motion.quaternions).swapaxes(-1, -2)
     soles = motion.positions[:, None, 2] + feet_from_torso[..., 2] - legs.radii
     max_stance_miss = _MAX_MISS if has_free_feet(body) else _MAX_MISS_OF_FEW_JOINTS

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import viser
 
 from arc_suite.animation import player_controls
-from arc_suite.animation.clips.weight import MAX_WEIGHT
+from arc_suite.animation.clips.swaying import MAX_WEIGHT
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.picture_buttons import PictureButtons
 from arc_suite.animation.studio.sketch import DEFAULT_CHOICE, Sketch

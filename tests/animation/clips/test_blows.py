@@ -10,7 +10,7 @@ from refusals import refused
 
 from arc_suite import rotations
 from arc_suite.animation import clips as export
-from arc_suite.animation.clips import blows, bounds, from_rest, getting_up, standing_legs
+from arc_suite.animation.clips import blow_clips, blows, bounds, from_rest, getting_up, standing_legs
 from arc_suite.animation.clips.blows import Blow
 from arc_suite.animation.clips.catalog import CLIPS, is_additive
 from arc_suite.animation.clips.draft import Draft
@@ -142,8 +142,8 @@ def fake_blows(monkeypatch, max_size, tilt_per_lever=0.0, max_drawn_size=9.0):
         quaternions = np.stack([REST.quaternion, *tilted.motion.quaternions[1:]])
         return tilted._replace(motion=tilted.motion._replace(quaternions=quaternions))
 
-    monkeypatch.setattr(from_rest, "_record_blow", record)
-    monkeypatch.setattr(from_rest, "_draw_blow", draw)
+    monkeypatch.setattr(blow_clips, "_record_blow", record)
+    monkeypatch.setattr(blow_clips, "_draw_blow", draw)
 
 
 RECORDER = SimpleNamespace(body=TICK)
@@ -153,21 +153,21 @@ def test_the_strongest_blow_counts_that_suits_the_body(monkeypatch):
     clip = CLIPS["stagger_left"]
     for limit, drawn, size in ((0.5, 9.0, 0.487), (9.0, 9.0, 3.0991), (9.0, 0.5, 0.487), (0.5, 0.1, 0.0906)):
         fake_blows(monkeypatch, limit, max_drawn_size=drawn)
-        taken = from_rest._take_blow(RECORDER, clip, REST)
+        taken = blow_clips.take_blow(RECORDER, clip, REST)
         assert taken.motion.joints[0, 0] == pytest.approx(size, abs=1e-3)
     fake_blows(monkeypatch, 0.0)
     with refused("under a blow of 0.077 sqrt(g h), its torso tilts by 40 degrees, more than 30"):
-        from_rest._take_blow(RECORDER, clip, REST)
+        blow_clips.take_blow(RECORDER, clip, REST)
     fake_blows(monkeypatch, 0.5, max_drawn_size=0.0)
     with refused("under a blow of 0.077 sqrt(g h), the legs leave the torso no room to sway"):
-        from_rest._take_blow(RECORDER, clip, REST)
+        blow_clips.take_blow(RECORDER, clip, REST)
 
 
 @pytest.mark.parametrize(("tilt_per_lever", "tilt"), [(11.0, 5.5), (3.0, 6.0), (1.3, 5.2), (0.2, 0.8)])
 def test_a_light_blow_comes_higher_until_the_torso_tilts_by_5_degrees(monkeypatch, tilt_per_lever, tilt):
     fake_blows(monkeypatch, 9.0, tilt_per_lever)
-    draft = from_rest._take_blow(RECORDER, CLIPS["hit_front"], REST)
-    assert from_rest._measure_tilt(draft.motion.quaternions) == pytest.approx(tilt)
+    draft = blow_clips.take_blow(RECORDER, CLIPS["hit_front"], REST)
+    assert blow_clips._measure_tilt(draft.motion.quaternions) == pytest.approx(tilt)
 
 
 def test_a_sway_that_legs_cannot_follow_is_smaller_and_its_tilt_stays():
@@ -177,7 +177,7 @@ def test_a_sway_that_legs_cannot_follow_is_smaller_and_its_tilt_stays():
     shares = np.sin(np.linspace(0.0, np.pi, 100))
     poses = shares[:, None] * (0.1, -0.8, 0.0, 0.0, -np.radians(5.0), 0.0)
     motion = standing_legs.pose_motion(TICK, idle, poses, np.tile(idle.joints, (100, 1)))
-    standing_motion = from_rest._stand_on_feet(TICK, motion, idle)
+    standing_motion = blow_clips._stand_on_feet(TICK, motion, idle)
     drawn = standing_legs.poses_of_motion(TICK, idle, standing_motion)
     assert np.degrees(np.ptp(drawn[:, 4])) == pytest.approx(5.0, abs=0.1)
     assert 0.1 < np.ptp(drawn[:, 1]) <= 0.4

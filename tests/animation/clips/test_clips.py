@@ -15,7 +15,7 @@ from tiers import never, tiers
 import arc_suite
 from arc_suite import policies, rotations
 from arc_suite.animation import clips as export
-from arc_suite.animation.clips import bounds, foot_contacts, from_rest, getting_up, loops, recordings
+from arc_suite.animation.clips import bounds, foot_contacts, getting_up, loops, passages, recordings
 from arc_suite.animation.clips.catalog import CLIPS, WalkLoop
 from arc_suite.bodies.generator import random_body
 from arc_suite.envs.setup import Setup
@@ -429,7 +429,7 @@ def test_what_is_played_from_rest_begins_or_ends_with_idle():
 
 @pytest.mark.slow
 def test_what_is_too_far_from_the_walk_is_left_out(monkeypatch):
-    monkeypatch.setattr(from_rest, "_MAX_MEETING_SEAM", 1e-6)
+    monkeypatch.setattr(passages, "_MAX_MEETING_SEAM", 1e-6)
     with pytest.warns(UserWarning, match="^tick, clip stop is left out: its pose is 0 degrees from that of the walk"):
         (walk,) = export.clips(Setup.of("tick", "steer"), ["walk", "stop"])
     assert walk.name == "walk"

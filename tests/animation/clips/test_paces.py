@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from arc_suite.animation.clips import weight
+from arc_suite.animation.clips import swaying
 from arc_suite.animation.clips.bounds import measure_ground
 from arc_suite.animation.clips.clips import Clip
 from arc_suite.animation.clips.drafts import make_drafts
@@ -56,7 +56,7 @@ def test_the_duty_factor_is_that_of_the_feet(events, duty_factor):
 @pytest.mark.long
 def test_a_run_is_no_walk_that_is_played_faster():
     recorder = Recorder(Setup.of(TICK, "steer"), "cpg", None)
-    drafts = make_drafts(recorder, ["slow", "walk", "run"], iter, {}, character=weight.choose_character(0.0))
+    drafts = make_drafts(recorder, ["slow", "walk", "run"], iter, {}, character=swaying.choose_character(0.0))
     speeds = {name: draft.motion.twist[0] for name, draft in drafts.items()}
     assert speeds["run"] > 1.4 * speeds["walk"] > 1.4 * speeds["slow"]
     cadences = [drafts["walk"].cycle / drafts[name].cycle for name in ("slow", "run")]

@@ -7,7 +7,7 @@ import pytest
 from refusals import refused
 
 from arc_suite import rotations
-from arc_suite.animation.clips import bounds, on_ground, planting, standing_legs, transients, weight
+from arc_suite.animation.clips import bounds, on_ground, planting, standing_legs, swaying, transients, weight
 from arc_suite.animation.clips.catalog import clip_of
 from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.drafts import make_drafts
@@ -23,7 +23,7 @@ NAMES = ["walk", "run", "turn_left", "start", "stop", "idle", "attack", "jump"]
 
 @functools.cache
 def drafts_of(size):
-    return make_drafts(recorder(), NAMES, iter, {}, character=weight.choose_character(size))
+    return make_drafts(recorder(), NAMES, iter, {}, character=swaying.choose_character(size))
 
 
 @functools.cache
@@ -62,7 +62,7 @@ def test_a_run_bounces_more_than_a_walk_and_leans_ahead():
     leans = {
         name: (tilt_of(drafts_of(1.0)[name].motion) - tilt_of(drafts_of(0.0)[name].motion))[:, 1] for name in NAMES
     }
-    np.testing.assert_allclose(leans["run"], np.degrees(weight.USUAL.lean), atol=0.2)
+    np.testing.assert_allclose(leans["run"], np.degrees(swaying.USUAL.lean), atol=0.2)
     assert drafts_of(1.0)["run"].weight == 1.0
 
 
@@ -135,7 +135,7 @@ def test_a_character_moves_its_torso_more():
 
 def test_a_spring_settles_where_its_path_ends():
     path = np.r_[0.0, np.ones(1999)]
-    followed = weight.USUAL.follow(TICK, path, time_step=0.002)
+    followed = swaying.USUAL.follow(TICK, path, time_step=0.002)
     assert abs(followed[0]) < 0.01 < 1.05 < followed.max() < 1.3
     np.testing.assert_allclose(followed[1000:1500], 1.0, atol=0.01)
 
@@ -155,7 +155,7 @@ def test_offsets_around_an_action_are_0_at_both_ends():
 
 
 def test_a_sway_only_lowers_the_torso():
-    sway = weight.Sway(bob=0.01j, roll=0.02, bank=0.01, sink=0.03)
+    sway = swaying.Sway(bob=0.01j, roll=0.02, bank=0.01, sink=0.03)
     phases = np.linspace(0.0, 1.0, 201)
     poses = sway.poses(phases)
     np.testing.assert_allclose([poses[:, 0].max(), poses[:, 0].min()], [-0.03, -0.05], atol=1e-9)
@@ -164,8 +164,8 @@ def test_a_sway_only_lowers_the_torso():
 
 
 def test_half_a_sway_is_half_of_all_but_its_sink():
-    sway = weight.Sway(bob=0.02j, roll=0.04, bank=0.02, lean=0.1, sink=0.3)
-    assert sway.scale(0.5, 0.05) == weight.Sway(bob=0.01j, roll=0.02, bank=0.01, lean=0.05, sink=0.05)
+    sway = swaying.Sway(bob=0.02j, roll=0.04, bank=0.02, lean=0.1, sink=0.3)
+    assert sway.scale(0.5, 0.05) == swaying.Sway(bob=0.01j, roll=0.02, bank=0.01, lean=0.05, sink=0.05)
 
 
 @pytest.mark.parametrize(
@@ -178,4 +178,4 @@ def test_half_a_sway_is_half_of_all_but_its_sink():
 )
 def test_a_weight_that_does_not_fit_is_refused(value, message):
     with refused(message):
-        weight.choose_character(value)
+        swaying.choose_character(value)
