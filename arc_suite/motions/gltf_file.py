@@ -47,6 +47,22 @@ class _File(NamedTuple):
     buffer: bytes
 
 
+class _Track(NamedTuple):
+    """A property of a node over time.
+
+    Attributes:
+        node: index of the node.
+        path: the property: translation, rotation or scale.
+        sampler: values and kind of interpolation, as in the file.
+        times: (keys,) s.
+    """
+
+    node: int
+    path: str
+    sampler: dict
+    times: np.ndarray
+
+
 def read(path: str | os.PathLike[str], clip: str | None = None) -> Skeleton:
     """Read an animation of a file as a skeleton, sampled at 60 frames a second.
 
@@ -166,31 +182,36 @@ def _sample(file: _File, nodes: list[dict], animation: dict) -> tuple[float, np.
 
     A node without a track keeps its place, as exporters leave out tracks that are constant.
     """
-    tracks = []
-    for channel in _list(animation, "channels"):
-        target = channel["target"]
-        size = _TRACK_SIZES.get(target.get("path"))
-        if size is None or "node" not in target:
-            continue  # weights of shapes
-        checks.integer("node of a channel", target["node"], 0, len(nodes) - 1)
-        sampler = _item(_list(animation, "samplers"), channel["sampler"], "sampler of a channel")
-        tracks.append((target["node"], target["path"], sampler, _read_times(file, sampler["input"])))
-    if not tracks:
-        raise ValueError("the animation moves no node")
-    first = min(float(times[0]) for *_, times in tracks)
-    last = max(float(times[-1]) for *_, times in tracks)
+    tracks = _list_tracks(file, nodes, animation)
+    first = min(float(track.times[0]) for track in tracks)
+    last = max(float(track.times[-1]) for track in tracks)
     frames = max(1, round((last - first) * FRAME_RATE)) + 1
     if not 2 <= frames <= MAX_FRAMES or frames * len(nodes) * 16 > _MAX_VALUES:
         raise ValueError(f"expected at most {MAX_FRAMES} frames, and fewer of many nodes, got {frames}")
     sample_times = np.linspace(first, last, frames)
     poses = np.tile([_node_transform(node) for node in nodes], (frames, 1, 1, 1))
     values_of_node: dict[int, dict[str, np.ndarray]] = {}
-    for node, path, sampler, times in tracks:
-        values = _interpolate(file, sampler, times, sample_times, _TRACK_SIZES[path])
-        values_of_node.setdefault(node, {})[path] = values
+    for track in tracks:
+        values_of_node.setdefault(track.node, {})[track.path] = _interpolate(file, track, sample_times)
     for node, values in values_of_node.items():
         poses[:, node] = _transforms(nodes[node], values, frames)
     return last - first, poses
+
+
+def _list_tracks(file: _File, nodes: list[dict], animation: dict) -> list[_Track]:
+    """Return the tracks of places, rotations and scales in an animation; a ValueError if there is none."""
+    tracks = []
+    for channel in _list(animation, "channels"):
+        target = channel["target"]
+        path = target.get("path")
+        if path not in _TRACK_SIZES or "node" not in target:
+            continue  # weights of shapes
+        checks.integer("node of a channel", target["node"], 0, len(nodes) - 1)
+        sampler = _item(_list(animation, "samplers"), channel["sampler"], "sampler of a channel")
+        tracks.append(_Track(target["node"], path, sampler, _read_times(file, sampler["input"])))
+    if not tracks:
+        raise ValueError("the animation moves no node")
+    return tracks
 
 
 def _read_times(file: _File, accessor: Any) -> np.ndarray:
@@ -200,11 +221,13 @@ def _read_times(file: _File, accessor: Any) -> np.ndarray:
     return times
 
 
-def _interpolate(file: _File, sampler: dict, times: np.ndarray, sample_times: np.ndarray, size: int) -> np.ndarray:
-    """Return the values (frames, size) of a track at times, as its kind of interpolation says."""
-    kind = sampler.get("interpolation", "LINEAR")
+def _interpolate(file: _File, track: _Track, sample_times: np.ndarray) -> np.ndarray:
+    """Return the values (frames, size) of a track at times (frames,), s, as its kind of interpolation says."""
+    kind = track.sampler.get("interpolation", "LINEAR")
     checks.name(kind, ("LINEAR", "STEP", "CUBICSPLINE"), "interpolation")
-    values = _read_accessor(file, sampler["output"], size)
+    size = _TRACK_SIZES[track.path]
+    times = track.times
+    values = _read_accessor(file, track.sampler["output"], size)
     keys_of_value = 3 if kind == "CUBICSPLINE" else 1
     if len(values) != keys_of_value * len(times):
         raise ValueError(f"expected {keys_of_value * len(times)} values of a track, got {len(values)}")
@@ -221,14 +244,19 @@ def _interpolate(file: _File, sampler: dict, times: np.ndarray, sample_times: np
         arriving, points, leaving = values.reshape(len(times), 3, size).swapaxes(0, 1)
         start_slope = duration * leaving[previous]
         end_slope = duration * arriving[previous + 1]
-        change = points[previous + 1] - points[previous]
-        bend = start_slope + end_slope - 2.0 * change
-        return points[previous] + share * (start_slope + share * (change - start_slope - bend + share * bend))
+        return _interpolate_cubically(points[previous], points[previous + 1], start_slope, end_slope, share)
     end = values[previous + 1]
     if size == 4:  # the short way round; keys are near each other, so that a line is as good as an arc
         cosines = (values[previous] * end).sum(axis=-1, keepdims=True)
         return _slerp(values[previous], np.where(cosines < 0.0, -end, end), share)
     return (1.0 - share) * values[previous] + share * end
+
+
+def _interpolate_cubically(start, end, start_slope, end_slope, share) -> np.ndarray:
+    """Return values on the cubic curves between two keys with slopes, per interval, at a share of the interval."""
+    change = end - start
+    bend = start_slope + end_slope - 2.0 * change
+    return start + share * (start_slope + share * (change - start_slope - bend + share * bend))
 
 
 def _slerp(start: np.ndarray, end: np.ndarray, share: np.ndarray) -> np.ndarray:
