@@ -1,10 +1,9 @@
-"""A sketch: the values of the widgets for body and task. Functions make the body, the task and lines of text of it."""
+"""A sketch: the values of the widgets for body and task. Functions make the body and the task of it."""
 
 import dataclasses
 import functools
 import json
 import math
-import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -117,11 +116,11 @@ def make_body(sketch: Sketch) -> Body:
         ValueError: as `source_body`, proportions out of range, or an unknown palette.
     """
     original_body = source_body(sketch)
-    shaped_body = shaped(original_body, **_shape_changes(sketch, original_body))
-    return shaped_body.replace(**_changes_of_looks(sketch, original_body))
+    shaped_body = shaped(original_body, **shape_changes(sketch, original_body))
+    return shaped_body.replace(**changes_of_looks(sketch, original_body))
 
 
-def _changes_of_looks(sketch: Sketch, original_body: Body) -> dict[str, Any]:
+def changes_of_looks(sketch: Sketch, original_body: Body) -> dict[str, Any]:
     """Return the fields of a body about its looks that a sketch sets."""
     changes: dict[str, Any] = {}
     if sketch.palette != DEFAULT_CHOICE:
@@ -201,95 +200,6 @@ def chosen_preset(sketch: Sketch) -> str | None:
     if sketch.preset == DEFAULT_CHOICE:
         return None
     return registry.refuse_import("law", sketch.preset)  # a law of another package has a preset of its name
-
-
-def spec_file_name(body: Body) -> str:
-    """Return the name of a body's spec file."""
-    return f"{body.name}.json"
-
-
-def python_lines(sketch: Sketch) -> str:
-    """Return Python that opens the same environment and policy.
-
-    A body from a file is read from `spec_file_name`, ground from the file that it came from.
-    """
-    code, names_by_package = _body_code(sketch)
-    settings = _settings_with_files(sketch, make_body(sketch))
-    settings_argument = f", {settings!r}" if settings else ""
-    preset = chosen_preset(sketch)
-    imports = "".join(
-        f"from {package} import {', '.join(names)}\n" for package, names in names_by_package.items() if names
-    )
-    return (
-        f"import arc_suite\n{imports}\n"
-        f"body = {code}\n"
-        f'environment = arc_suite.load(body, "{sketch.task}"{settings_argument})\n'
-        f"policy = policies.policy({sketch.policy!r}, body, {preset!r}, task=environment.task.definition)\n"
-    )
-
-
-def _body_code(sketch: Sketch) -> tuple[str, dict[str, list[str]]]:
-    """Return a Python expression that makes the body, and the names that the lines import, by package."""
-    original_body = source_body(sketch)
-    bodies: list[str] = []  # names of the package arc_suite.bodies
-    robots: list[str] = []  # names of the package arc_suite.robots
-    if sketch.source == LEGS:
-        layout_argument = "" if sketch.layout == DEFAULT_CHOICE else f', "{sketch.layout}"'
-        bodies.append("generator")
-        code = f"generator.generate({sketch.legs}, {sketch.links}{layout_argument})"
-    elif sketch.source == RANDOM:
-        bodies.append("families")
-        code = f"families.sound_body({sketch.seed})"
-    elif sketch.source in ROBOTS:
-        robots.append("ROBOTS")
-        code = f'ROBOTS["{sketch.source}"]'
-    else:
-        spec_name = spec_file_name(original_body) if sketch.source == FILE else sketch.source
-        robots.append("spec_files")
-        code = f'spec_files.load_body("{spec_name}")'
-    shape_changes = _shape_changes(sketch, original_body)
-    if shape_changes:
-        arguments = ", ".join(f"{name}={value!r}" for name, value in shape_changes.items())
-        bodies.append("shaping")
-        code = f"shaping.shaped({code}, {arguments})"
-    looks = _changes_of_looks(sketch, original_body)
-    if looks:
-        code = f"{code}.replace({', '.join(f'{name}={value!r}' for name, value in looks.items())})"
-    return code, {"arc_suite": ["policies"], "arc_suite.bodies": bodies, "arc_suite.robots": robots}
-
-
-def command_line(sketch: Sketch) -> str:
-    """Return the command that shows the same creature in a window.
-
-    A body that the program cannot name or make is read from its saved spec, `spec_file_name`.
-    """
-    body = make_body(sketch)
-    is_unchanged = body == source_body(sketch)
-    if sketch.source in ROBOTS and is_unchanged:
-        body_flags = ["--robot", sketch.source]
-    elif sketch.source in EXAMPLES and is_unchanged:
-        body_flags = ["--spec", sketch.source]
-    elif sketch.source == LEGS and body == generator.generate(sketch.legs, sketch.links):
-        body_flags = ["--legs", str(sketch.legs), "--links", str(sketch.links)]
-    else:
-        body_flags = ["--spec", spec_file_name(body)]
-    setting_flags = [f"--set={name}={_flag_value(value)}" for name, value in _settings_with_files(sketch, body).items()]
-    policy_flags = [] if sketch.policy == "cpg" else ["--policy", sketch.policy]
-    preset_flags = [] if sketch.preset == DEFAULT_CHOICE else ["--preset", sketch.preset]
-    task_flags = ["--task", sketch.task, *setting_flags]
-    return shlex.join(["arc-suite", "view", *body_flags, *task_flags, *policy_flags, *preset_flags])
-
-
-def _settings_with_files(sketch: Sketch, body: Body) -> dict[str, Any]:
-    """Return all settings of the task, with the file in place of its ground."""
-    settings = make_settings(sketch, body)
-    if sketch.ground_file and settings.get("arena") == sketch.ground_file:
-        settings["arena"] = sketch.ground
-    return settings
-
-
-def _flag_value(value: Any) -> str:
-    return value if isinstance(value, str) else json.dumps(value)
 
 
 def open_file(sketch: Sketch, text: str) -> Sketch:
@@ -430,7 +340,7 @@ def _are_close(first: Vector, second: Vector) -> bool:
     return math.dist(first, second) <= _MAX_END_DIFFERENCE * math.hypot(*first, *second)
 
 
-def _shape_changes(sketch: Sketch, body: Body) -> dict[str, Any]:
+def shape_changes(sketch: Sketch, body: Body) -> dict[str, Any]:
     """Return the fields of `shaping.Shape` in which the proportions of a sketch differ from those of its source.
 
     Args:

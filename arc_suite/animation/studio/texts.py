@@ -4,10 +4,10 @@ import time
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
-from arc_suite.animation.studio import sketch as sketches
+from arc_suite.animation.studio import copy_lines
 from arc_suite.animation.studio.creature import Creature
 from arc_suite.animation.studio.session import Session, Walker
-from arc_suite.animation.studio.sketch import Sketch
+from arc_suite.animation.studio.sketch import Sketch, make_body
 
 _REAL_TIME_PACE = 0.97  # simulated seconds a second, from which a walk counts as being in real time
 _SMALL_STYLE = "font-size:0.85em"
@@ -110,9 +110,9 @@ def flaws(creature: Creature) -> str:
 
 def lines_to_copy(sketch: Sketch) -> str:
     """Return the Python lines and the command line that make the same creature, with buttons to copy them, as HTML."""
-    texts = {"Python": sketches.python_lines(sketch), "command": sketches.command_line(sketch)}
+    texts = {"Python": copy_lines.python_lines(sketch), "command": copy_lines.command_line(sketch)}
     elements = []
-    spec_file = sketches.spec_file_name(sketches.make_body(sketch))
+    spec_file = copy_lines.spec_file_name(make_body(sketch))
     if any(spec_file in text for text in texts.values()):
         elements.append(_element("p", f"Save the spec first: these lines read {spec_file}.", style=_SMALL_STYLE))
     for name, text in texts.items():

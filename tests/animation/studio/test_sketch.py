@@ -12,8 +12,8 @@ import pytest
 from refusals import refused
 
 from arc_suite import moved, registry
+from arc_suite.animation.studio import copy_lines, states, texts
 from arc_suite.animation.studio import sketch as sketches
-from arc_suite.animation.studio import states, texts
 from arc_suite.animation.studio.creature import open_creature
 from arc_suite.animation.studio.effects import idle_fields
 from arc_suite.animation.studio.sketch import FILE, RANDOM, Sketch
@@ -111,11 +111,11 @@ def test_factors_of_links_that_the_body_lacks_are_ignored():
 @pytest.mark.parametrize("sketch", SKETCHES.values(), ids=SKETCHES)
 def test_python_lines_make_the_same(sketch, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / sketches.spec_file_name(sketches.source_body(sketch))).write_text(
+    (tmp_path / copy_lines.spec_file_name(sketches.source_body(sketch))).write_text(
         body_to_json(sketches.source_body(sketch))
     )
     made = {}
-    lines = sketches.python_lines(sketch)
+    lines = copy_lines.python_lines(sketch)
     imported = re.findall(r"^from (\S+) import (.+)$", lines, re.MULTILINE)
     paths = {f"{package}.{name}" for package, names in imported for name in names.split(", ")}
     assert not paths & moved.MOVED.keys()
@@ -131,22 +131,24 @@ def test_python_lines_make_the_same(sketch, tmp_path, monkeypatch):
 def test_the_command_line_is_understood(sketch, tmp_path):
     """The window of `view` needs a display; `evaluate` takes the same flags."""
     body = sketches.make_body(sketch)
-    (tmp_path / sketches.spec_file_name(body)).write_text(body_to_json(body))
-    program, view, *flags = shlex.split(sketches.command_line(sketch))
+    (tmp_path / copy_lines.spec_file_name(body)).write_text(body_to_json(body))
+    program, view, *flags = shlex.split(copy_lines.command_line(sketch))
     assert (program, view) == ("arc-suite", "view")
     done = programs.arc_suite("evaluate", *flags, "--episodes=1", "--set=time_limit=0.5", cwd=tmp_path)
     assert body.name in programs.passed(done)
 
 
 def test_command_lines():
-    assert sketches.command_line(SKETCHES["legs"]) == "arc-suite view --legs 6 --links 2 --task directed"
-    assert sketches.command_line(SKETCHES["layout"]).startswith("arc-suite view --spec walker_6x3.json --task directed")
-    assert sketches.command_line(SKETCHES["robot"]) == (
+    assert copy_lines.command_line(SKETCHES["legs"]) == "arc-suite view --legs 6 --links 2 --task directed"
+    assert copy_lines.command_line(SKETCHES["layout"]).startswith(
+        "arc-suite view --spec walker_6x3.json --task directed"
+    )
+    assert copy_lines.command_line(SKETCHES["robot"]) == (
         "arc-suite view --robot queen --task walk --set=arena=bumps --set=kicks=0.5 --preset tuned"
     )
-    assert "--spec spider" in sketches.command_line(SKETCHES["example"])
-    assert "--spec tick_shaped.json" in sketches.command_line(SKETCHES["shaped robot"])
-    assert sketches.command_line(SKETCHES["random"]).endswith("--spec random_7.json --task directed --policy zero")
+    assert "--spec spider" in copy_lines.command_line(SKETCHES["example"])
+    assert "--spec tick_shaped.json" in copy_lines.command_line(SKETCHES["shaped robot"])
+    assert copy_lines.command_line(SKETCHES["random"]).endswith("--spec random_7.json --task directed --policy zero")
     note = "Save the spec first: these lines read random_7.json."
     assert note in texts.lines_to_copy(SKETCHES["random"])
     assert "Save the spec first" not in texts.lines_to_copy(SKETCHES["robot"])
@@ -159,8 +161,8 @@ def test_ground_of_a_file_stays_with_the_sketch(tmp_path):
     creature = open_creature(sketch)
     arena = creature.environment.task.definition.scene.arena
     assert not arena.is_level and arena.map.name == "hill"
-    assert f"--set=arena={word} " in sketches.command_line(sketch)
-    assert f"'arena': {word!r}" in sketches.python_lines(sketch)
+    assert f"--set=arena={word} " in copy_lines.command_line(sketch)
+    assert f"'arena': {word!r}" in copy_lines.python_lines(sketch)
     state = states.PageState(sketch)
     assert states.from_json(states.to_json(state)).sketch == sketch
 
