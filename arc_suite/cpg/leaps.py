@@ -15,8 +15,8 @@ from arc_suite import rotations
 from arc_suite.cpg.drives import drive
 from arc_suite.models import posture
 from arc_suite.models.kinematics import Legs
-from arc_suite.models.sizing import control_timestep, simulation, size_body, time_unit
-from arc_suite.models.standing import pose_mechanics, standing_qpos
+from arc_suite.models.sizing import control_timestep, simulation, size_body
+from arc_suite.models.standing import pose_mechanics, standing_qpos, time_unit
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.batch import Batch
 from arc_suite.simulation.model import compile_model

@@ -17,10 +17,9 @@ from arc_suite.cpg.gait import gait_of
 from arc_suite.cpg.law import Drive, Pattern, joint_targets, proprioception
 from arc_suite.models.overlap import find_largest_stretch
 from arc_suite.models.sizing import size_body
-from arc_suite.models.standing import PoseMechanics, measure_standing
+from arc_suite.models.standing import PoseMechanics, measure_standing, speed_unit
 from arc_suite.models.stride import FOOT_LIFT, cycle_angles, strokes
 from arc_suite.tasks.contract import Task
-from arc_suite.tasks.fitting import speed_unit
 
 _MIN_FROUDE = 1e-3
 

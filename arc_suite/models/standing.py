@@ -58,14 +58,14 @@ def time_unit(body: Body) -> float:
     return math.sqrt(body.torso.standing_height / GRAVITY)
 
 
-def velocity_unit(body: Body) -> float:
-    """Return the speed of a body that falls by half of its height, sqrt(g h), m/s."""
-    return math.sqrt(GRAVITY * body.torso.standing_height)
+def speed_unit(height: float) -> float:
+    """Return sqrt(g h), m/s, for a standing height, m."""
+    return math.sqrt(GRAVITY * height)
 
 
-def rate_unit(body: Body) -> float:
-    """Return the unit of frequencies, sqrt(g / h), 1/s."""
-    return math.sqrt(GRAVITY / body.torso.standing_height)
+def rate_unit(height: float) -> float:
+    """Return sqrt(g / h), 1/s, for a standing height, m."""
+    return math.sqrt(GRAVITY / height)
 
 
 def pose_mechanics(

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from arc_suite.models.standing import rate_unit, speed_unit
 from arc_suite.robots.mirror import Image
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import mirrors
-from arc_suite.tasks.fitting import rate_unit, speed_unit
 from arc_suite.tasks.mirrors import Mirror
 from arc_suite.tasks.parts import HEADED, ROTATIONS, WORLD, Joints, Part, Phase, Quaternion, RigidParts, Scalar, Vector
 

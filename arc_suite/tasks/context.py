@@ -5,8 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from arc_suite.models.sizing import time_unit
-from arc_suite.models.standing import GRAVITY, measure_standing
+from arc_suite.models.standing import GRAVITY, measure_standing, time_unit
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import STEPS
 from arc_suite.tasks.fitting import velocity_units

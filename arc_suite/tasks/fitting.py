@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from arc_suite.models.standing import GRAVITY, measure_standing
+from arc_suite.models.standing import measure_standing, rate_unit, speed_unit
 from arc_suite.models.stride import TARGET_FROUDE, fitted_gait, gait_frequency
 from arc_suite.robots.spec import Body
 
@@ -24,16 +24,6 @@ LINEAR_VELOCITY_NOISE = 0.01  # sqrt(g h); published: 0.007 to 0.05
 ANGULAR_VELOCITY_NOISE = 0.004  # sqrt(g / h); published: 0.003 to 0.02
 JOINT_ANGLE_NOISE = 0.1  # rad, as published
 JOINT_VELOCITY_NOISE = 0.02  # sqrt(g / h); published: 0.014 to 0.03
-
-
-def speed_unit(height: float) -> float:
-    """Return sqrt(g h), m/s, for a standing height, m."""
-    return math.sqrt(GRAVITY * height)
-
-
-def rate_unit(height: float) -> float:
-    """Return sqrt(g / h), 1/s, for a standing height, m."""
-    return math.sqrt(GRAVITY / height)
 
 
 def fitted_parameters(body: Body) -> dict:

@@ -12,7 +12,7 @@ import numpy as np
 
 from arc_suite import checks, rotations
 from arc_suite.models import posture
-from arc_suite.models.standing import GRAVITY
+from arc_suite.models.standing import GRAVITY, rate_unit
 from arc_suite.robots import gaits
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import terms
@@ -20,7 +20,6 @@ from arc_suite.tasks.blocks import Block, gait_clock
 from arc_suite.tasks.clock import TWO_PI
 from arc_suite.tasks.command import BAND, COMMANDS, LONGEST, SHORTEST, begins_next, scheduled_value
 from arc_suite.tasks.context import Context
-from arc_suite.tasks.fitting import rate_unit
 from arc_suite.tasks.parts import ROTATIONS, Legs, Planar, Scalar
 
 CYCLE = 1 << 20  # units of the clock in a cycle of the gait

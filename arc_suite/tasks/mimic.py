@@ -20,14 +20,14 @@ import numpy as np
 from arc_suite import checks, rotations
 from arc_suite.markers import Marker
 from arc_suite.models.sizing import position_gains, size_body
-from arc_suite.models.standing import measure_standing
+from arc_suite.models.standing import measure_standing, rate_unit
 from arc_suite.motions import Motion, check_body, motion_text, striding
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import blocks, parameters, parts
 from arc_suite.tasks import readings as reading
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.contract import FileSetting, Inputs, Start, Task
-from arc_suite.tasks.fitting import rate_unit, reach
+from arc_suite.tasks.fitting import reach
 from arc_suite.tasks.ghost import draw_pose
 from arc_suite.tasks.motion_tables import POSES_AHEAD, MotionTables, split_next_angles
 from arc_suite.tasks.parameters import Noise, Parameters

@@ -8,7 +8,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.animation.clips import hard_ground
-from arc_suite.models.standing import time_unit, velocity_unit
+from arc_suite.models.standing import speed_unit, time_unit
 from arc_suite.robots.spec import Body
 
 # By the side that is hit: forward and left components of the blow.
@@ -43,7 +43,7 @@ class Blow(NamedTuple):
         steps = math.ceil(_DURATION * time_unit(body) / model.opt.timestep)
         torso = model.body("torso").id
         direction = rotations.to_heading_frame(np.array(DIRECTIONS[self.side]), -rotations.yaw(data.xquat[torso]))
-        momentum = self.size * velocity_unit(body) * model.body_mass.sum()  # N s
+        momentum = self.size * speed_unit(body.torso.standing_height) * model.body_mass.sum()  # N s
         force = np.append(direction, 0.0) * momentum / (steps * model.opt.timestep)
         torque = np.cross((0.0, 0.0, self.lever * height), force)
         data.xfrc_applied[torso] = np.concatenate([force, torque])

@@ -210,7 +210,7 @@ def follow_exactly(
     standing_height = body.torso.standing_height
     joints, misses = keep_feet_in_place(body, rest, poses, lifts)
     joints = _smooth(joints, smoothing_rounds)
-    max_joint_step = _MAX_JOINT_SPEED * rate_unit(body) * time_step(body)
+    max_joint_step = _MAX_JOINT_SPEED * rate_unit(body.torso.standing_height) * time_step(body)
     if abs(np.diff(joints, axis=0)).max() > max_joint_step or not _feet_stay(body, misses, lifts):
         return None
     motion = pose_motion(body, rest, poses, joints)
@@ -296,7 +296,7 @@ def time_step(body: Body) -> float:
 
 def sample_times(body: Body, duration: float) -> np.ndarray:
     """Return the times (samples,) of a duration, both in sqrt(h / g), both ends included."""
-    step = time_step(body) * rate_unit(body)
+    step = time_step(body) * rate_unit(body.torso.standing_height)
     return np.linspace(0.0, duration, 1 + max(2, round(duration / step)))
 
 

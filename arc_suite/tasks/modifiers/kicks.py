@@ -7,10 +7,9 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.markers import Marker
-from arc_suite.models.standing import GRAVITY
+from arc_suite.models.standing import GRAVITY, speed_unit
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.blocks import Block
-from arc_suite.tasks.fitting import speed_unit
 from arc_suite.tasks.modifiers.arrows import draw_arrow
 from arc_suite.tasks.modifiers.draws import Episode
 from arc_suite.tasks.modifiers.modifier import Modifier
