@@ -1,5 +1,6 @@
 """Notebooks hold what they print and draw, small and without folders of the machine that ran them."""
 
+import configparser
 import json
 import pathlib
 import re
@@ -21,3 +22,13 @@ def test_a_notebook_shows_what_it_does(path: pathlib.Path):
     pictures = "".join(str(output.get("data", "")) for output in shown)
     assert "image/png" in pictures or "image/webp" in pictures, f"{path.name} shows nothing: make notebooks"
     assert FOLDER.findall("".join(str(output.get("text", "")) for output in shown)) == []
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_the_first_cell_installs_dm_control_where_labmaze_has_no_wheel(path: pathlib.Path):
+    config = configparser.ConfigParser()
+    config.read(run_notebooks.ROOT / "setup.cfg")
+    (pinned,) = re.findall(r"^(dm-control==\S*);", config["options"]["install_requires"], re.MULTILINE)
+    first = next(cell for cell in json.loads(path.read_text())["cells"] if cell["cell_type"] == "code")
+    assert "if sys.version_info >= (3, 13):" in "".join(first["source"])
+    assert f"    %pip install -q --no-deps {pinned}\n" in first["source"]
