@@ -16,7 +16,8 @@ from studies.pages import table_writer
 from arc_suite.cli import program
 from arc_suite.learning.studies import benchmark, entries, results
 from arc_suite.learning.studies.divisions import DIVISIONS
-from studies import bodies, catalog, claims, coverage, kinds, peers
+from arc_suite.policies.network import PACKAGED
+from studies import bodies, catalog, claims, coverage, kinds, packaged, peers
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -61,6 +62,7 @@ TABLES: dict[tuple[str, str], Callable[[], str]] = {
     ("benchmark", "table"): lambda: benchmark.text(STUDIES),
     ("benchmark", "peers"): lambda: peers.text(STUDIES),
     ("any_body", "table"): lambda: bodies.text(STUDIES / "bodies.csv"),
+    ("results", "packaged"): lambda: packaged.text(PACKAGED / "policies.json"),
     ("study", "table"): returns_next_to_the_papers,
     ("algorithms", "parallel-parts"): lambda: kinds.text(STUDIES, "parallel-parts"),
     ("algorithms", "legs"): lambda: kinds.text(STUDIES, "legs"),
