@@ -28,6 +28,7 @@ _MEASURED_TABLES = {
     "clips": "Clips",
     "performance": "Performance",
     "reliability": "Reliability",
+    "newcomers": "Newcomers",
 }
 
 # Tasks with a page in docs/; docs/ground.md is about the other tasks.
