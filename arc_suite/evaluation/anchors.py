@@ -81,7 +81,12 @@ class Anchors(NamedTuple):
 
 
 def of_returns(returns_by_policy: Returns, seeds: Sequence[int] = ()) -> Anchors:
-    """Return the anchors of returns by policy, one of which is `zero`.
+    """Return the anchors of returns by policy; see `levels_of_returns`."""
+    return of_levels(levels_of_returns(returns_by_policy, seeds))
+
+
+def levels_of_returns(returns_by_policy: Returns, seeds: Sequence[int] = ()) -> dict[str, Level]:
+    """Return the mean returns by policy, one of which is `zero`.
 
     Args:
         returns_by_policy: returns of the episodes from seed 0 on.
@@ -91,42 +96,60 @@ def of_returns(returns_by_policy: Returns, seeds: Sequence[int] = ()) -> Anchors
     fewest_episodes = min(returns.size for returns in returns_by_policy.values())
     if len(seeds) and min(seeds) >= 0 and max(seeds) < fewest_episodes:
         returns_by_policy = {name: returns[list(seeds)] for name, returns in returns_by_policy.items()}
-    means = {name: float(returns.mean()) for name, returns in returns_by_policy.items()}
-    zero = means.pop(ZERO)
-    best = max(means, key=means.__getitem__, default=None)
-    return Anchors(zero, None if best is None else means[best], best)
+    levels = {}
+    for name, returns in returns_by_policy.items():
+        error = float(returns.std() / np.sqrt(returns.size))
+        levels[name] = Level(float(returns.mean()), error, returns.size)
+    return levels
 
 
 def of_levels(levels: Mapping[str, Level]) -> Anchors:
-    """Return the anchors of mean returns by policy: `zero`, one demonstrator, and maybe `judging.BLIND`."""
-    ((preset, demonstrator),) = ((name, level) for name, level in levels.items() if name not in (ZERO, judging.BLIND))
-    blind = levels[judging.BLIND].mean if judging.BLIND in levels else None
+    """Return the anchors of mean returns by policy: `zero`, demonstrators, and maybe `judging.BLIND`."""
     zero = levels[ZERO]
-    return Anchors(zero.mean, demonstrator.mean, preset, blind, (zero.error, demonstrator.error))
+    blind = levels[judging.BLIND].mean if judging.BLIND in levels else None
+    demonstrators = {name: level for name, level in levels.items() if name not in (ZERO, judging.BLIND)}
+    if not demonstrators:
+        return Anchors(zero.mean, blind=blind)
+    preset = max(demonstrators, key=lambda name: demonstrators[name].mean)
+    best = demonstrators[preset]
+    return Anchors(zero.mean, best.mean, preset, blind, (zero.error, best.error))
 
 
 def anchors(setup: Setup, seeds: Sequence[int] = ()) -> Anchors:
     """Return the anchors of a robot, a task and settings; those that are not committed are measured.
 
-    Anchors come from `judging.csv` where it has the place, except for episodes of seeds 0 to 99: these are scored by
-    the same episodes in `anchors.csv`.
-
     Args:
         setup: robot, task and settings.
-        seeds: seeds of the episodes that are scored, see `of_returns`.
+        seeds: seeds of the episodes that are scored, see `levels_of_returns`.
 
     Raises:
         ValueError: a setting of the task that does not fit, or episodes that need not end.
     """
     if setup.several:
         return _measure_several_bodies(setup)
+    levels = committed_levels(setup, seeds)
+    if levels is None:
+        levels = levels_of_returns(measure_returns(setup), seeds)
+    return of_levels(levels)
+
+
+def committed_levels(setup: Setup, seeds: Sequence[int] = ()) -> Mapping[str, Level] | None:
+    """Return the committed mean returns of the policies that are anchors; None if there are none.
+
+    They come from `judging.csv` where it has the place, except for episodes of seeds 0 to 99: these are scored by the
+    same episodes in `anchors.csv`.
+
+    Args:
+        setup: robot, task and settings.
+        seeds: seeds of the episodes that are scored, see `levels_of_returns`.
+    """
+    if setup.several:
+        return None
     returns_by_policy = committed_returns(setup)
     levels = judging.levels(setup)
     if levels is not None and (returns_by_policy is None or not are_of_before(seeds)):
-        return of_levels(levels)
-    if returns_by_policy is None:
-        returns_by_policy = measure_returns(setup)
-    return of_returns(returns_by_policy, seeds)
+        return levels
+    return None if returns_by_policy is None else levels_of_returns(returns_by_policy, seeds)
 
 
 def are_of_before(seeds: Sequence[int]) -> bool:

@@ -62,7 +62,10 @@ def mean(runs: Sequence[Configuration], folder: Path) -> str:
 
 
 def _describe_returns(run: Configuration, returns: np.ndarray) -> str:
-    """Return mean, standard deviation and score of returns as text, with the anchors of the score."""
+    """Return mean, standard deviation and score of returns as text, with the anchors of the score.
+
+    Anchors stand with their standard errors, after `+-`.
+    """
     mean_return = returns.mean()
     scale = anchors.anchors(run.validation)
     zero_error, demonstrator_error = (f" +- {error:.1f}" for error in scale.errors) if scale.errors else ("", "")
@@ -75,4 +78,4 @@ def _describe_returns(run: Configuration, returns: np.ndarray) -> str:
         score = f"score {scale.score(mean_return):z.2f}"
         demonstrator = f"demonstrator {scale.preset} {scale.demonstrator:.1f}{demonstrator_error}"
         levels = f"{score} ({levels}, {demonstrator}, over other seeds)"
-    return f"return {mean_return:.1f} +- {returns.std():.1f}, {levels}"
+    return f"return {mean_return:.1f}, deviation {returns.std():.1f}, {levels}"

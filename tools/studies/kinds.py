@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from arc_suite.learning.studies import report, results
+from arc_suite.learning.studies import results
 from arc_suite.learning.studies.results import RunResult
 from arc_suite.learning.studies.tables import Study
 from arc_suite.learning.studies.text_tables import score_of_seeds, table
@@ -53,7 +53,7 @@ def _cells_by_kind(published: Path, study: Study) -> dict[str, dict[str, str]]:
 
 def _score_cell(seeds: Sequence[RunResult], demonstrators) -> str:
     """Return the scores of the latest policies of a kind as text."""
-    scores = report.scores_of(seeds, demonstrators)
+    scores = [results.score_of(result, demonstrators) for result in seeds]
     if np.isnan(scores).any():
         raise ValueError(f"run {seeds[0].run.name}: expected a place with anchors, got {seeds[0].run.place}")
     return score_of_seeds(scores)

@@ -36,7 +36,8 @@ _TEXT = (
     "episodes or as the [benchmark](../docs/benchmark.md#how-we-judge) judges. Then the task's own metric, speed in "
     "m/s; headings are relative to the x axis, which is not the direction of a command. Runs of one configuration "
     "that several studies have are in one row. Phases: the most updates of the critics alone; 75,000 are published. "
-    "Earlier model: the body or the ground has changed since the run, so that the command gives another return."
+    "Earlier model: the body or the ground has changed since the run, so that the command gives another return. Judged "
+    "on seeds from 0 on: a run of an earlier version, whose command gives another return now."
 )
 
 

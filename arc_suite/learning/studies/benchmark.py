@@ -3,6 +3,8 @@
 studies/scores.csv holds a row for each run, by `write`. The table of all learners is made from this file alone.
 """
 
+import itertools
+import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -12,7 +14,6 @@ import numpy as np
 
 from arc_suite import checks, evaluation
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import anchors
 from arc_suite.learning.studies import csv_files, results
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS, TURNING, place_setup
 from arc_suite.learning.studies.results import RunResult
@@ -24,11 +25,6 @@ HALF = 0.5  # score until which CPU time is counted
 STYLE = ("gait_compliance", "heading_error")
 STYLE_HEADS = ("gait compliance", "heading error, rad")
 NOT_RUN = "not run"
-# Notes on runs from before.
-SEEN_SEEDS = "judged on seeds from 0 on"
-EASIER_GROUND = "easier ground on rough and stairs"
-
-OTHER_SETTINGS = "other settings of the task"
 _LEARNER_PATTERN = re.compile(r"[\w.-]+")
 
 
@@ -47,6 +43,7 @@ class RunScore(NamedTuple):
         first_seed: seed of the first episode that judges it.
         notes: reasons why the score is not comparable with others; empty without any.
         physics_sha256: hash of the model in which the run learned, or in which a policy was judged; empty if unknown.
+        task_kwargs: settings of the task as JSON where they are not those of the place; empty otherwise.
     """
 
     robot: str
@@ -61,6 +58,14 @@ class RunScore(NamedTuple):
     first_seed: int = 0
     notes: str = ""
     physics_sha256: str = ""
+    task_kwargs: str = ""
+
+    @property
+    def setup(self) -> Setup:
+        """Setup of the run."""
+        if self.task_kwargs:
+            return Setup.of(self.robot, self.task, json.loads(self.task_kwargs))
+        return place_setup(self.robot, self.task)
 
 
 COLUMNS = ("division", "learner", *RunScore._fields)  # columns of `SCORES`
@@ -85,26 +90,23 @@ def _score_result(result: RunResult) -> RunScore:
             f"{result.steps[-1]:,}; its learner must yield a slice at the latest where the next evaluation is due"
         )
     setup = configuration.setup
-    curve_scores = anchors.anchors(setup, result.curve_seeds).score(result.returns.mean(axis=1))
-    notes = list(result.notes)
-    if not result.policy_sha256:
-        notes.append(SEEN_SEEDS)
-    if result.other_settings:
-        notes.append(OTHER_SETTINGS if setup.task_kwargs else EASIER_GROUND)
-    reaching = np.flatnonzero(curve_scores >= HALF)
+    scale = results.anchors_of(result, result.curve_seeds)
+    half = np.inf if scale is None else scale.at(HALF)
+    reaching = np.flatnonzero(result.returns.mean(axis=1) >= half)
     minutes = result.cpu[reaching[0]] / 60.0 if reaching.size else np.inf
     return RunScore(
         robot=setup.name,
         task=setup.kind.name,
         seed=result.run.configuration.seed,
         result=result.final,
-        score=float(anchors.anchors(setup, result.seeds).score(result.final)),
+        score=results.score_of(result),
         minutes=float(minutes),
         **style_fields(setup, result.style),
         policy_sha256=result.policy_sha256,
         first_seed=result.seeds[0] if len(result.seeds) else 0,
-        notes="; ".join(notes),
+        notes="; ".join(result.notes),
         physics_sha256=result.physics_sha256,
+        task_kwargs=json.dumps(dict(setup.task_kwargs)) if result.other_settings else "",
     )
 
 
@@ -156,13 +158,13 @@ def read(studies: Path) -> dict[tuple[str, str], list[RunScore]]:
     """
     scores_by_learner: dict[tuple[str, str], list[RunScore]] = {}
     for row in csv_files.read(studies / SCORES, COLUMNS):
-        division, learner, robot, task, seed, *cells, policy_sha256, first_seed, notes, physics_sha256 = row.values()
-        checks.name(division, DIVISIONS, "division")
-        score = RunScore(
-            robot, task, int(seed), *map(float, cells), policy_sha256, int(first_seed), notes, physics_sha256
-        )
+        division = checks.name(row.pop("division"), DIVISIONS, "division")
+        learner = row.pop("learner")
+        cells = {name: kind(row[name]) for name, kind in RunScore.__annotations__.items()}
+        score = RunScore(**cells)
         if np.isinf((score.result, score.score)).any():
-            raise ValueError(f"{studies / SCORES}: expected finite returns and scores, got {', '.join(cells)[:100]}")
+            what = f"got {score.result} and {score.score}"
+            raise ValueError(f"{studies / SCORES}: expected finite returns and scores, {what}")
         scores_by_learner.setdefault((division, learner), []).append(score)
     return scores_by_learner
 
@@ -267,8 +269,7 @@ def _notes_text(groups: Groups) -> str:
     for scores in groups.values():
         for score in scores:
             notes += [note for note in score.notes.split("; ") if note]
-    models = []
-    for (robot, task), scores in groups.items():
-        models += [(place_setup(robot, task), score.physics_sha256) for score in scores]
-    notes += results.note_earlier_models(models)
+        notes += results.note_same_policy(score.policy_sha256 for score in scores)
+    all_scores = itertools.chain(*groups.values())
+    notes += results.note_earlier_models((score.setup, score.physics_sha256) for score in all_scores)
     return "; ".join(dict.fromkeys(notes)) or "-"

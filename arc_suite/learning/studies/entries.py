@@ -2,6 +2,7 @@
 
 import contextlib
 import difflib
+import hashlib
 import itertools
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -99,7 +100,7 @@ def _judge_policy(path: Path, setup: Setup, seed: int, frozen_folder: Frozen | N
         frozen_folder: copy of its folder, which a module needs.
     """
     is_module = path.suffix == named.PYTHON_EXTENSION
-    sha256 = frozen_folder.sha256 if is_module else policies.digest(str(path))
+    sha256 = hash_module(frozen_folder, path.name) if is_module else policies.digest(str(path))
     seeds = judging.seeds_of(sha256)
     setup = judging.setup_of(setup, seeds)
     training_seeds = provenance.training_seeds(f"{path}:{MAKE}" if is_module else str(path), seeds)
@@ -127,6 +128,14 @@ def _judge_policy(path: Path, setup: Setup, seed: int, frozen_folder: Frozen | N
         "physics_sha256": results.hash_physics(place_setup(setup.name, setup.kind.name)),
     }
     return Judged(score_lines(facts, lines), lines)
+
+
+def hash_module(frozen_folder: Frozen, name: str) -> str:
+    """Return the hash of a module's policy: of all files of its folder, and of the module's name.
+
+    So modules of one folder play other episodes.
+    """
+    return hashlib.sha256(f"{frozen_folder.sha256}\0{name}".encode()).hexdigest()
 
 
 def score_lines(facts: Mapping[str, Any], lines: finals.Lines) -> RunScore:
@@ -160,8 +169,14 @@ def score_anew(scores: Sequence[RunScore], published: Path) -> list[RunScore]:
         OSError: the table cannot be read.
     """
     lines_by_run = results.read_episodes(published, results.FINALS)
+    new_scores = []
     with parsers.guard(f"{published / results.FINALS}: damaged"):
-        return [score_lines(score._asdict(), lines_by_run[run_name(score)]) for score in scores]
+        for score in scores:
+            name = run_name(score)
+            lines = lines_by_run[name]
+            results.check_finals(name, lines, score.policy_sha256)
+            new_scores.append(score_lines(score._asdict(), lines))
+    return new_scores
 
 
 @contextlib.contextmanager

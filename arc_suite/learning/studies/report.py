@@ -1,6 +1,7 @@
 """Reports of studies: Markdown and curves, of published tables alone."""
 
 import io
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from PIL import Image
 
 from arc_suite import evaluation, files
 from arc_suite.evaluation import anchors, judging, published
-from arc_suite.evaluation.anchors import Anchors
+from arc_suite.evaluation.judging import Level
 from arc_suite.learning.studies import results
 from arc_suite.learning.studies.results import Groups, RunResult
 from arc_suite.learning.studies.tables import Study
@@ -18,6 +19,7 @@ from arc_suite.simulation import films
 
 REPORT = "README.md"
 CURVES = "curves.png"
+OF_BENCHMARK = "of the benchmark"
 Sections = Mapping[str, Sequence[str]]  # paragraphs of each section of a report, by its title
 
 
@@ -66,9 +68,10 @@ _ABOUT_PAPER = " Dotted: the paper's returns at the last step, from 50,000 on."
 _ABOUT_FINALS = (
     "Mean over 100 seeded episodes of the latest policy, unless noted. Over three seeds or more it has a 95 % interval "
     "(Student's t). Score: (return - standing still) / (best demonstrator - standing still), over the same episodes or "
-    "as the benchmark judges. Earlier model: the body or the ground has changed since the run. The paper's returns are "
-    "at equal steps, read off its curves within about 30. Then come standing still and the demonstrators, with the "
-    "standard deviation over episodes."
+    "as the benchmark judges. Earlier model: the body or the ground has changed since the run. Judged on seeds from 0 "
+    "on: a run of an earlier version, whose command gives another return now. The paper's returns are "
+    "at equal steps, read off its curves within about 30. Then come standing still and the demonstrators: mean +- "
+    "standard error. Anchors have the scores 0 and 1, for runs of as many episodes as the note says."
 )
 _ABOUT_EFFICIENCY = (
     "Environment steps and minutes of one core until an evaluation has the score 0.5, and the return 3,500; a dash if "
@@ -144,8 +147,8 @@ def _plot_curves(groups: Groups, demonstrators):
         algorithms = [curve.algorithm for curve in curves.values()]
         last_step = max(curve.steps[-1] for curve in curves.values())
         paper_returns_by_place[place] = evaluation.published_returns(setup, algorithms, last_step)
-        returns_by_policy = _anchor_returns(first_kind[0], demonstrators)
-        levels_by_place[place] = {_policy_label(name): returns.mean() for name, returns in returns_by_policy.items()}
+        levels = _shown_levels(first_kind[0], demonstrators)
+        levels_by_place[place] = {_policy_label(name): level.mean for name, level in levels.items()}
     return plots.plot_study(curves_by_place, levels_by_place, paper_returns_by_place)
 
 
@@ -168,18 +171,6 @@ def _policy_label(name: str) -> str:
     return labels.get(name, f"demonstrator {name}")
 
 
-def _anchor_returns(result: RunResult, demonstrators) -> Mapping[str, np.ndarray]:
-    """Return the returns by policy of standing still and of demonstrators in the place of a result.
-
-    They are those of the study, (episodes,), or else mean returns () of the benchmark, where it has any.
-    """
-    returns_by_policy = demonstrators.get(result.run.place)
-    if returns_by_policy is not None:
-        return returns_by_policy
-    levels = judging.levels(result.run.configuration.setup) or {}
-    return {name: np.array(level.mean) for name, level in levels.items()}
-
-
 def interval_text(values: np.ndarray) -> str:
     """Return the interval of the mean of returns (seeds,) as text; a dash for too few seeds."""
     _, (low, high) = evaluation.mean_and_interval([values])
@@ -198,34 +189,7 @@ def score_text(seeds: Sequence[RunResult], demonstrators) -> str:
         seeds: results in a place.
         demonstrators: see `results.read_demonstrators`.
     """
-    return _format_score(np.mean(scores_of(seeds, demonstrators)))
-
-
-def scores_of(seeds: Sequence[RunResult], demonstrators) -> list[float]:
-    """Return the score of the latest policy of each seed in a place; NaN without anchors; see `score_text`."""
-    scores = []
-    for result in seeds:
-        scale = anchors_of(result, result.seeds, demonstrators)
-        scores.append(np.nan if scale is None else float(scale.score(result.final)))
-    return scores
-
-
-def anchors_of(result: RunResult, seeds: Sequence[int], demonstrators) -> Anchors | None:
-    """Return the anchors for episodes of a result; None where none are known.
-
-    They are those of the benchmark where it has any. Episodes of earlier versions have means over the same episodes of
-    the study's demonstrators.
-
-    Args:
-        result: result of a run.
-        seeds: seeds of the episodes.
-        demonstrators: see `results.read_demonstrators`.
-    """
-    levels = judging.levels(result.run.configuration.setup)
-    if levels is not None and not anchors.are_of_before(seeds):
-        return anchors.of_levels(levels)
-    returns_by_policy = demonstrators.get(result.run.place)
-    return None if returns_by_policy is None else anchors.of_returns(returns_by_policy, seeds)
+    return _format_score(np.mean([results.score_of(result, demonstrators) for result in seeds]))
 
 
 def _format_score(score: float) -> str:
@@ -261,40 +225,80 @@ def _finals_table(groups: Groups, demonstrators) -> str:
                 results.join_notes(seeds),
             )
             lines.append(run_cells)
-        lines += _anchor_lines(seeds[0], demonstrators)
+        lines += _anchor_lines(list(itertools.chain(*kinds.values())), demonstrators)
     heads = ("robot, task", "algorithm", "steps", "seeds", "return", "95 %", "of each seed", "score")
     return table((*heads, "paper, equal steps", "notes"), lines)
 
 
-def _anchor_lines(result: RunResult, demonstrators) -> list[tuple[str, ...]]:
-    """Return the lines of standing still and of demonstrators in the place of a result."""
-    returns_by_policy = _anchor_returns(result, demonstrators)
+def _anchor_lines(run_results: Sequence[RunResult], demonstrators) -> list[tuple[str, ...]]:
+    """Return the lines of standing still and of demonstrators in the place of results.
+
+    Results of other episodes have other anchors, with lines of their own.
+    """
+    lines_by_episodes = {}
+    for result in run_results:
+        episodes = OF_BENCHMARK if _has_levels_of_benchmark(result) else f"for {len(result.finals)} episodes"
+        if episodes not in lines_by_episodes:
+            lines_by_episodes[episodes] = _anchor_lines_of(result, episodes, demonstrators)
+    return list(itertools.chain(*lines_by_episodes.values()))
+
+
+def _has_levels_of_benchmark(result: RunResult) -> bool:
+    """Return whether the anchors of a result are those over the seeds of `judging`."""
+    levels = judging.levels(result.run.configuration.setup)
+    return levels is not None and levels == results.levels_of(result, result.seeds)
+
+
+def _anchor_lines_of(result: RunResult, episodes: str, demonstrators) -> list[tuple[str, ...]]:
+    """Return the lines of standing still and of demonstrators for the episodes of a result.
+
+    Args:
+        result: result of a run.
+        episodes: words for the episodes.
+        demonstrators: see `results.read_demonstrators`.
+    """
+    levels = _shown_levels(result, demonstrators)
+    scale = results.anchors_of(result, result.seeds, demonstrators)
     expert_return = evaluation.expert_return(result.run.configuration.setup)
     lines = []
-    for name, returns in returns_by_policy.items():
+    for name, level in levels.items():
+        is_anchor = name in (anchors.ZERO, scale.preset)
         is_paper_expert = name == "medium" and expert_return
-        is_of_benchmark = returns.ndim == 0
         cells = (
             result.run.place,
             _policy_label(name),
             "-",
             "-",
-            f"{returns:.1f}" if is_of_benchmark else f"{returns.mean():.1f} +- {returns.std():.1f}",
+            f"{level.mean:.1f} +- {level.error:.1f}",
             "-",
             "-",
-            _format_score(anchors.of_returns(returns_by_policy).score(returns.mean())),
+            _format_score(scale.score(level.mean)),
             f"{expert_return:.0f}" if is_paper_expert else "-",
-            "anchor of the benchmark" if is_of_benchmark else "".join(results.note_few_episodes(returns)) or "-",
+            f"anchor {episodes}" if is_anchor else f"{level.seeds} episodes",
         )
         lines.append(cells)
     return lines
+
+
+def _shown_levels(result: RunResult, demonstrators) -> Mapping[str, Level]:
+    """Return the mean returns of standing still and of demonstrators for the episodes of a result, by policy.
+
+    Those that score it come first, then those of further demonstrators that the study has measured.
+    """
+    levels = results.levels_of(result, result.seeds, demonstrators) or {}
+    returns_by_policy = demonstrators.get(result.run.place)
+    if returns_by_policy is None or _has_levels_of_benchmark(result):
+        return levels
+    study_levels = anchors.levels_of_returns(returns_by_policy, result.seeds)
+    further_levels = {name: level for name, level in study_levels.items() if name not in levels}
+    return {**levels, **further_levels}
 
 
 def _efficiency_table(groups: Groups, demonstrators) -> str:
     """Return the table of steps and CPU time until two returns."""
     lines = []
     for place, kind, seeds in by_kind(groups):
-        scale = anchors_of(seeds[0], seeds[0].curve_seeds, demonstrators)
+        scale = results.anchors_of(seeds[0], seeds[0].curve_seeds, demonstrators)
         half_score = np.inf if scale is None else scale.at(0.5)
         cells = []
         for threshold in (half_score, 3500.0):

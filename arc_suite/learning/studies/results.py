@@ -12,6 +12,8 @@ import numpy as np
 from arc_suite import evaluation, parsers, usage
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors, judging, provenance
+from arc_suite.evaluation.anchors import Anchors
+from arc_suite.evaluation.judging import Level
 from arc_suite.evaluation.published import CURVES
 from arc_suite.learning.agents.configuration import CONFIGURATION_FIELDS, PROVENANCE_FIELDS, TRAINING_SEEDS
 from arc_suite.learning.finals import are_of
@@ -45,6 +47,11 @@ _NOT_METRICS = (
 # Notes on a final return.
 SHARED_SEEDS = "data share seeds with evaluation"
 TEN_EPISODES = "ten episodes"
+# Of runs of earlier versions, whose commands give other returns now.
+SEEN_SEEDS = "judged on seeds from 0 on"
+NOT_JUDGED = "not judged"
+EASIER_GROUND = "easier ground on rough and stairs"
+OTHER_SETTINGS = "other settings of the task"
 EARLIER_MODEL = "earlier model"
 UNKNOWN_SOURCE = "source unknown"
 SAME_POLICY = "seeds with one policy"
@@ -96,6 +103,10 @@ class RunResult(NamedTuple):
     def notes(self) -> tuple[str, ...]:
         """Reasons why the final return is not comparable with others."""
         reasons = list(note_few_episodes(self.finals))
+        if not self.policy_sha256:
+            reasons.append(SEEN_SEEDS if anchors.are_of_before(self.seeds) else NOT_JUDGED)
+        if self.other_settings:
+            reasons.append(OTHER_SETTINGS if self.run.configuration.setup.task_kwargs else EASIER_GROUND)
         declared_source = self.run.configuration.definition.source
         if declared_source == usage.UNKNOWN:
             reasons.append(UNKNOWN_SOURCE)
@@ -159,7 +170,8 @@ def _result(
     evaluations = _group_by_step(episodes)
     _check_counts(run.name, [len(evaluation_rows) for evaluation_rows in evaluations])
     _check_steps(run.name, run_row, int(evaluations[-1][0]["step"]))
-    _check_finals(run.name, finals)
+    if finals:
+        check_finals(run.name, finals, finals[0]["policy_sha256"])
 
     def curve_column(name: str) -> np.ndarray:
         """Return a column of the episodes of the curve, (evaluations, episodes)."""
@@ -236,11 +248,12 @@ def _check_steps(name: str, run_row: Mapping[str, str], last_step: int) -> None:
         raise ValueError(f"{name}: expected the {sum(counts):,} steps of {RUNS}, got {last_step:,}")
 
 
-def _check_finals(name: str, finals: Sequence[Mapping[str, str]]) -> None:
-    """Check that the episodes that judge a run's policy are those that follow from its hash."""
-    if not finals:
-        return
-    sha256 = finals[0]["policy_sha256"]
+def check_finals(name: str, finals: Sequence[Mapping[str, str]], sha256: str) -> None:
+    """Check that the episodes that judge a policy are those that follow from its hash.
+
+    Raises:
+        ValueError: they are not.
+    """
     if not are_of(finals, sha256):
         expected_seeds = judging.seeds_of(sha256)
         expected = f"{len(expected_seeds)} episodes from seed {expected_seeds.start} on, which follow from the hash"
@@ -260,6 +273,45 @@ def group_by_place(results: Sequence[RunResult]) -> Groups:
         kinds = groups.setdefault(result.run.place, {})
         kinds.setdefault(result.run.kind, []).append(result)
     return groups
+
+
+Demonstrators = Mapping[str, Mapping[str, np.ndarray]]  # see `read_demonstrators`
+
+
+def score_of(result: RunResult, demonstrators: Demonstrators | None = None) -> float:
+    """Return the score of the latest policy of a run; NaN without anchors.
+
+    Args:
+        result: result of the run.
+        demonstrators: returns that the study has measured, for places without committed anchors; None for none.
+    """
+    scale = anchors_of(result, result.seeds, demonstrators)
+    return np.nan if scale is None else float(scale.score(result.final))
+
+
+def anchors_of(result: RunResult, seeds: Sequence[int], demonstrators: Demonstrators | None = None) -> Anchors | None:
+    """Return the anchors for episodes of a result; None where none are known; see `levels_of`."""
+    levels = levels_of(result, seeds, demonstrators)
+    return None if levels is None else anchors.of_levels(levels)
+
+
+def levels_of(
+    result: RunResult, seeds: Sequence[int], demonstrators: Demonstrators | None = None
+) -> Mapping[str, Level] | None:
+    """Return the mean returns of the policies that are anchors for episodes of a result; None where none are known.
+
+    They are the committed ones, see `anchors.committed_levels`, or else those of the study.
+
+    Args:
+        result: result of a run.
+        seeds: seeds of the episodes.
+        demonstrators: returns that the study has measured; None for none.
+    """
+    levels = anchors.committed_levels(result.run.configuration.setup, seeds)
+    if levels is not None:
+        return levels
+    returns_by_policy = (demonstrators or {}).get(result.run.place)
+    return None if returns_by_policy is None else anchors.levels_of_returns(returns_by_policy, seeds)
 
 
 def is_in_paper(result: RunResult) -> bool:
@@ -287,6 +339,16 @@ def note_earlier_models(models: Iterable[tuple[Setup, str]]) -> tuple[str, ...]:
     return (EARLIER_MODEL if all(are_earlier) else f"{EARLIER_MODEL}: {sum(are_earlier)} of {len(are_earlier)} runs",)
 
 
+def note_same_policy(hashes: Iterable[str]) -> tuple[str, ...]:
+    """Return a note if seeds of one place have one policy; none otherwise.
+
+    Args:
+        hashes: hash of the policy of each seed; empty if it is unknown.
+    """
+    known_hashes = [sha256 for sha256 in hashes if sha256]
+    return (SAME_POLICY,) if len(set(known_hashes)) < len(known_hashes) else ()
+
+
 @functools.cache
 def hash_physics(setup: Setup) -> str:
     """Return the hash of the model of a setup, as the code makes it now; empty for several bodies."""
@@ -297,9 +359,7 @@ def join_notes(seeds: Sequence[RunResult]) -> str:
     """Return the notes of all results without repetitions; a dash without any."""
     notes = [note for result in seeds for note in result.notes]
     notes += note_earlier_models((result.run.configuration.setup, result.physics_sha256) for result in seeds)
-    hashes = [result.policy_sha256 for result in seeds if result.policy_sha256]
-    if len(set(hashes)) < len(hashes):
-        notes.append(SAME_POLICY)
+    notes += note_same_policy(result.policy_sha256 for result in seeds)
     return "; ".join(dict.fromkeys(notes)) or "-"
 
 

@@ -29,8 +29,8 @@ for number in ("hidden=16", "batch=8", "start_steps=20", "phase_every=100", "pha
     TINY += ["--hp", number]
 WORDS = f"(there are: {', '.join(registry.robot_words())}, module:name)"
 FINISHED = re.compile(
-    r"runs/tick-walk-sope_eo-0: finished, return \d+\.\d \+- \d+\.\d, score -?\d\.\d\d "
-    r"\(standing still \d+\.\d, demonstrator refined \d+\.\d, over other seeds\)\n"
+    r"runs/tick-walk-sope_eo-0: finished, return \d+\.\d, deviation \d+\.\d, score -?\d\.\d\d "
+    r"\(standing still \d+\.\d \+- \d+\.\d, demonstrator refined \d+\.\d \+- \d+\.\d, over other seeds\)\n"
 )
 
 
@@ -127,7 +127,9 @@ def test_export_of_what_is_no_run(tmp_path, arguments, message):
 
 CLIMB = ["--robot=tick", "--algorithm=tiny_studies:climb", "--set", "time_limit=0.2", "--steps=40"]
 CLIMB += ["--evaluate_every=20"]
-REACHED = r"run: score -100 reached at step 20, after \d+ s \(\d+ s of CPU time\), return \S+ \+- \S+, score \S+ \(.*"
+REACHED = (
+    r"run: score -100 reached at step 20, after \d+ s \(\d+ s of CPU time\), return \S+, deviation \S+, score \S+ \(.*"
+)
 NEXT = [f"arc-suite {program} --policy run" for program in ("evaluate", "render", "play")]
 NEXT = [NEXT[0], f"{NEXT[1]} -o run.mp4", f"{NEXT[2]} -o run.html"]
 STOPPED = "other: stopped at --minutes=0 of CPU time; more minutes resume it, no evaluation yet\n"
@@ -169,10 +171,12 @@ def test_several_seeds(tmp_path):
     returns = [run_folder.table(tmp_path / "runs" / f"{name}-{seed}", "evaluations")["return"][-10:] for seed in (0, 2)]
     for seed, each in zip((0, 2), returns, strict=True):
         (line,) = (line for line in lines if line.startswith(f"runs/{name}-{seed}: finished"))
-        assert f", return {each.mean():.1f} +- {each.std():.1f}, score " in line
+        assert f", return {each.mean():.1f}, deviation {each.std():.1f}, score " in line
         assert f"runs/{name}-{seed}: judged in 100 episodes, seeds 4" in lines[lines.index(line) + 1]
     means = [each.mean() for each in returns]
-    assert lines[-1].startswith(f"runs: mean of 2 seeds, return {np.mean(means):.1f} +- {np.std(means):.1f}, score ")
+    assert lines[-1].startswith(
+        f"runs: mean of 2 seeds, return {np.mean(means):.1f}, deviation {np.std(means):.1f}, score "
+    )
     assert run("train", *CLIMB, "--seed=2", "-o", "alone", cwd=tmp_path).returncode == 0
     tables = [(tmp_path / each / "evaluations.csv").read_text() for each in ("alone", f"runs/{name}-2")]
     assert tables[0] == tables[1]

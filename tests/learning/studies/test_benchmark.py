@@ -215,6 +215,8 @@ def test_runs_of_an_earlier_model_are_noted(tmp_path):
     )
     (earlier,) = benchmark.score_results([result([0.1, 0.2], seed=1)._replace(physics_sha256="0" * 64)])
     unknown = score(("tick", "walk"), 2, 0.2)
+    # The policies of a test are one.
+    now, earlier = (each._replace(policy_sha256="") for each in (now, earlier))
     few = "10 of 10 places have fewer than 3 seeds"
     for scores, note in (
         ([now, unknown], ""),
@@ -223,6 +225,34 @@ def test_runs_of_an_earlier_model_are_noted(tmp_path):
     ):
         benchmark.write(tmp_path, "samples", "mine", [each._replace(notes="") for each in scores])
         assert row(benchmark.text(tmp_path), "mine")[-1] == few + note
+
+
+def test_a_run_of_other_settings_is_compared_with_the_model_of_these(tmp_path):
+    """Ground of two places has become harder since: that is no earlier model."""
+    easier = Setup.of("tick", "rough")
+    learned = result([0.1, 0.2], task="rough")._replace(other_settings=True)
+    for sha256, notes in ((results.hash_physics(easier), []), ("0" * 64, [results.EARLIER_MODEL])):
+        (scored,) = benchmark.score_results([learned._replace(physics_sha256=sha256)])
+        assert scored.setup == easier and results.EASIER_GROUND in scored.notes
+        benchmark.write(tmp_path, "samples", "mine", [scored])
+        assert benchmark.read(tmp_path)["samples", "mine"] == [scored]
+        few, *noted = row(benchmark.text(tmp_path), "mine")[-1].split("; ")
+        assert noted == ["ten episodes", results.EASIER_GROUND, *notes]
+
+
+def test_copies_of_a_policy_are_no_seeds(tmp_path):
+    """Within a place; one policy of several places has a seed in each."""
+    copies = [each._replace(policy_sha256="ab" * 32) for each in complete({})]
+    twins = [*copies[:2], *(each._replace(policy_sha256=f"{index:064x}") for index, each in enumerate(copies[2:]))]
+    universal = [each._replace(policy_sha256=f"{each.seed:064x}") for each in complete({})]
+    for name, scores, note in (
+        ("copies", copies, results.SAME_POLICY),
+        ("twins", twins, results.SAME_POLICY),
+        ("universal", universal, "-"),
+        ("unknown", complete({}), "-"),
+    ):
+        benchmark.write(tmp_path, "top", name, scores)
+        assert row(benchmark.text(tmp_path), name)[-1] == note
 
 
 def test_places_with_more_seeds_weigh_no_more(tmp_path):
@@ -296,6 +326,41 @@ def make(robot):
 """
 
 
+def test_modules_of_a_folder_play_other_episodes(tmp_path):
+    for seed in range(3):
+        (tmp_path / f"tick-walk-{seed}.py").write_text(MODULE)
+
+    def first_seeds():
+        with frozen.freeze(tmp_path) as copy:
+            hashes = [entries.hash_module(copy, f"tick-walk-{seed}.py") for seed in range(3)]
+        return [judging.seeds_of(sha256).start for sha256 in hashes]
+
+    before = first_seeds()
+    assert before == first_seeds() and len(set(before)) == 3
+    (tmp_path / "weights.npy").write_bytes(b"1")
+    assert not set(before) & set(first_seeds()), "all files of the folder count"
+
+
+@pytest.mark.parametrize(
+    ("row", "changes"),
+    [(3, {"seed": "7"}), (0, {"policy_sha256": "cd" * 32}), (99, None)],
+    ids=["seed", "hash", "fewer"],
+)
+def test_edited_episodes_of_judged_policies_are_refused(tmp_path, row, changes):
+    sha256 = "ab" * 32
+    fields = {"policy_sha256": sha256, "return": "300.5", "length": "9"}
+    fields |= {f"style_{metric}": "0.1" for metric in benchmark.STYLE}
+    lines = [fields | {"seed": str(seed)} for seed in judging.seeds_of(sha256)]
+    entry = score(("tick", "walk"), 0, 0.5)._replace(policy_sha256=sha256)
+    publication.write_finals(tmp_path, {"tick-walk-0": lines})
+    (again,) = entries.score_anew([entry], tmp_path)
+    assert again.result == 300.5
+    lines[row : row + 1] = [] if changes is None else [lines[row] | changes]
+    publication.write_finals(tmp_path, {"tick-walk-0": lines})
+    with refused(f"{tmp_path / 'finals.csv'}: damaged: tick-walk-0: finals.csv: expected 100 episodes ", begins=True):
+        entries.score_anew([entry], tmp_path)
+
+
 @pytest.mark.long
 def test_modules_are_scored_and_what_is_no_policy_is_left_out(tmp_path, monkeypatch):
     """A module acts by the weights next to it; this one stands still, for one episode."""
@@ -310,7 +375,7 @@ def test_modules_are_scored_and_what_is_no_policy_is_left_out(tmp_path, monkeypa
     found = judged.score
     assert found[:3] == ("tick", "walk", 2) and found.score == pytest.approx(0.0, abs=0.05)
     with frozen.freeze(tmp_path) as copy:
-        assert found.policy_sha256 == copy.sha256
+        assert found.policy_sha256 == entries.hash_module(copy, "tick-walk-2.py")
     assert found.first_seed == judging.seeds_of(found.policy_sha256).start >= 4_100_000_000
     (episode,) = judged.lines
     assert episode["seed"] == str(found.first_seed) and float(episode["return"]) == found.result

@@ -9,7 +9,7 @@ from published_tables import as_in_the_paper, cells, constant, publish
 
 from arc_suite import evaluation, usage
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import judging, published
+from arc_suite.evaluation import anchors, judging, published
 from arc_suite.learning.agents import algorithms
 from arc_suite.learning.studies import csv_files, publication, report, results
 from arc_suite.learning.studies.tables import Study, run
@@ -32,13 +32,14 @@ def test_report(made):
         "`arc-suite train --robot=tick --task=walk --algorithm=sope --steps=1000000 --seed=0 --evaluate_every=10000`"
     )
     assert cells(page, "tick, walk", "sope", "0")[3:] == ["1,000,000 of 1,000,000", "3.0", command]
-    # 3610 and 3611, each with 0 to 9 on top; the anchors are 1600 and 3600
-    final = ["2", "3615.0", "-", "3614.5, 3615.5", "1.01", "3610", "ten episodes"]
+    # 3610 and 3611, each with 0 to 9 on top; the anchors of ten episodes are 1640.0 and 3886.1
+    final = ["2", "3615.0", "-", "3614.5, 3615.5", "0.88", "3610", f"ten episodes; {results.SEEN_SEEDS}"]
     assert cells(page, "tick, walk", "sope", "1,000,000")[3:] == final
-    assert cells(page, "leaper, walk", "sope", "1,000,000")[7] == "-", "without anchors"
-    medium = ["2048.0 +- 0.0", "-", "-", "0.22", "2048", "ten episodes"]
+    # The study has measured `medium`. Committed anchors count before its others.
+    medium = ["2048.0 +- 0.0", "-", "-", "0.19", "2048", "10 episodes"]
     assert cells(page, "queen, walk", "demonstrator medium")[4:] == medium
-    assert cells(page, "queen, walk", "standing still")[4:] == ["1600.0 +- 0.0", "-", "-", "0.00", "-", "-"]
+    standing = ["1634.8 +- 1.7", "-", "-", "0.00", "-", "anchor for 10 episodes"]
+    assert cells(page, "queen, walk", "standing still")[4:] == standing
     area = f"{np.mean([104.5, 2594.5, 104.5, 2595.5]):.1f}"
     assert cells(page, "tick, walk", "sac", "-", "-") == ["tick, walk", "sac", "-", "-", "-", "-", area]
     assert cells(page, "tick, walk", "sope", "1,000,000", "3.0")[4:6] == ["1,000,000", "3.0"]
@@ -110,10 +111,41 @@ def test_a_judged_policy_has_the_score_of_the_benchmark(tmp_path):
     first, second = results.read_results([new, old], tmp_path)
     levels = judging.levels(new.configuration.setup)
     zero, best = levels["zero"].mean, levels["refined"].mean
+    assert results.score_of(first) == (300.5 - zero) / (best - zero)
     assert report.score_text([first], {}) == f"{(300.5 - zero) / (best - zero):.2f}"
-    demonstrators = {new.place: {"zero": np.full(10, 0.0), "medium": np.full(10, second.final * 2)}}
-    assert report.score_text([second], demonstrators) == "0.50"
-    assert report.score_text([first, second], {}) == "-", "without anchors of the second"
+    of_study = {new.place: {"zero": np.full(100, 0.0), "medium": np.full(10, 2.0 * first.final)}}
+    assert results.score_of(first, of_study) == results.score_of(first)
+    paired = anchors.of_returns(anchors.committed_returns(old.configuration.setup), range(10))
+    assert results.score_of(second, of_study) == paired.score(second.final), "a run from before has committed anchors"
+
+
+def test_a_place_without_committed_anchors_has_those_of_the_study(tmp_path):
+    each = run("tick", "sac", 1_000_000, task="roam")
+    publish(tmp_path, each, constant(100.0, 200.0))
+    (result,) = results.read_results([each], tmp_path)
+    demonstrators = {each.place: {"zero": np.full(10, 0.0), "medium": np.full(10, result.final * 2)}}
+    assert report.score_text([result], demonstrators) == "0.50"
+    assert report.score_text([result], {}) == "-"
+
+
+def test_runs_of_other_episodes_have_anchors_of_their_own(tmp_path):
+    """A judged run and one of before in one place: what a report prints for each gives its score."""
+    new, old = runs = [run("tick", "sac", 1_000_000, seed, "steer", label=f"sac-{seed}") for seed in (0, 1)]
+    for each in runs:
+        publish(tmp_path, each, constant(100.0, 200.0))
+    publication.write_finals(tmp_path, {new.name: judge("ab" * 32)})
+    anchors.write(tmp_path / results.DEMONSTRATORS, {new.place: {"zero": np.zeros(10), "steered": np.full(10, 9e3)}})
+    page = report.write("mine", Study("mine", tuple(runs)), tmp_path).read_text()
+    lines = [line.strip("| ").split(" | ") for line in page.splitlines() if " | anchor " in line]
+    assert [line[-1] for line in lines] == ["anchor of the benchmark"] * 2 + ["anchor for 10 episodes"] * 2
+    for each, levels in (
+        (new, judging.levels(new.configuration.setup)),
+        (old, anchors.committed_levels(old.configuration.setup, range(10))),
+    ):
+        assert [line[4] for line in lines if line[4] == f"{levels['zero'].mean:.1f} +- {levels['zero'].error:.1f}"]
+        final = 300.5 if each is new else 204.5
+        assert cells(page, each.place, each.kind, "1,000,000")[7] == f"{anchors.of_levels(levels).score(final):z.2f}"
+    assert "| 9000.0 +- 0.0 |" in page, "a demonstrator of the study is no anchor"
 
 
 def test_finals_are_those_that_judge_the_policy(tmp_path):
@@ -132,6 +164,7 @@ def test_finals_are_those_that_judge_the_policy(tmp_path):
     assert first.run == new and not first.other_settings
     assert second.policy_sha256 == "" and second.final == 204.5 and second.seeds == [*range(10)]
     assert second.other_settings and second.run.place == "tick, rough" != new.place
+    assert second.notes == ("ten episodes", results.SEEN_SEEDS, results.EASIER_GROUND) and first.notes == ()
 
 
 def test_what_an_algorithm_has_used_is_noted_unless_it_declares_it(tmp_path, monkeypatch):
@@ -144,8 +177,18 @@ def test_what_an_algorithm_has_used_is_noted_unless_it_declares_it(tmp_path, mon
         row["sources"] = '["a demonstrator", "prior data"]'
     csv_files.write(tmp_path / results.RUNS, results.RUN_COLUMNS, rows)
     mine, declared = results.read_results(runs, tmp_path)
-    assert mine.notes == ("ten episodes", "source unknown", "has used a demonstrator", "has used prior data")
-    assert declared.sources == mine.sources and declared.notes == ("ten episodes", "has used a demonstrator")
+    assert mine.notes == (
+        "ten episodes",
+        results.SEEN_SEEDS,
+        "source unknown",
+        "has used a demonstrator",
+        "has used prior data",
+    )
+    assert declared.sources == mine.sources and declared.notes == (
+        "ten episodes",
+        results.SEEN_SEEDS,
+        "has used a demonstrator",
+    )
 
 
 @pytest.mark.parametrize(
@@ -209,7 +252,7 @@ def test_one_seed_has_no_interval(tmp_path):
     for each in runs:
         publish(tmp_path / "mine", each, constant(100.0, 200.0))
     page = report.write("mine", Study("one seed each", runs), tmp_path / "mine").read_text()
-    finals = ["204.5", "-", "204.5", "-", "2590", "ten episodes"]
+    finals = ["204.5", "-", "204.5", "-0.64", "2590", f"ten episodes; {results.SEEN_SEEDS}"]
     assert cells(page, "tick, walk", "sac", "1,000,000", "1")[4:] == finals
 
 

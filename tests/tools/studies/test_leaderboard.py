@@ -8,7 +8,7 @@ import pytest
 from published_tables import cells, constant, publish
 from refusals import refused
 
-from arc_suite.evaluation import judging
+from arc_suite.evaluation import anchors
 from arc_suite.learning.studies import benchmark, csv_files, report, results
 from arc_suite.learning.studies.benchmark import RunScore
 from arc_suite.learning.studies.tables import Study, run
@@ -91,7 +91,8 @@ def test_rows_need_no_algorithm_of_another_package(tmp_path, notes):
     page = (tmp_path / "README.md").read_text()
     row = cells(page, "tick, walk", "evo:ars")
     assert row[2:8] == ["-", "-", "2", "204.5", "-", "204.5, 204.5"]
-    assert row[15:] == [f"ten episodes; {notes}".strip("; "), "[top-evo.ars](top-evo.ars/README.md)", EVO_COMMAND]
+    notes_of_row = f"ten episodes; judged on seeds from 0 on; {notes}".strip("; ")
+    assert row[15:] == [notes_of_row, "[top-evo.ars](top-evo.ars/README.md)", EVO_COMMAND]
     assert cells(page, "tick, walk", "dagger")[16] == "[imitation](imitation/README.md)"
     study = catalog.committed_study("top-evo.ars", published)
     assert study.title == "division top of the benchmark: evo:ars, 2 of 30 runs"
@@ -103,7 +104,7 @@ def test_rows_need_no_algorithm_of_another_package(tmp_path, notes):
 def test_an_algorithm_that_uses_what_a_division_does_not_give_is_noted(tmp_path):
     published = publish_evo(tmp_path, "source unknown", sources='["a demonstrator"]')
     (row,) = leaderboard.study_rows("top-evo.ars", published)
-    assert row["notes"] == "ten episodes; source unknown; has used a demonstrator"
+    assert row["notes"] == "ten episodes; judged on seeds from 0 on; source unknown; has used a demonstrator"
 
 
 @pytest.mark.parametrize(
@@ -126,9 +127,9 @@ def test_reports_of_other_packages_are_written_from_their_tables(tmp_path):
     publish_evo(tmp_path / "studies")
     programs.passed(programs.tool("study", "top-evo.ars", "--report", cwd=tmp_path))
     page = (tmp_path / "studies" / "top-evo.ars" / report.REPORT).read_text()
-    levels = judging.levels(run("tick", "sac", 1).configuration.setup)
+    level = anchors.committed_levels(run("tick", "sac", 1).configuration.setup, range(10))["zero"]
     assert cells(page, "tick, walk", "evo:ars", "0")[3:] == ["1,000,000 of 1,000,000", "3.0", EVO_COMMAND]
-    assert cells(page, "tick, walk", "standing still")[4] == f"{levels['zero'].mean:.1f}"
+    assert cells(page, "tick, walk", "standing still")[4] == f"{level.mean:.1f} +- {level.error:.1f}"
 
 
 def test_the_committed_leaderboard_is_made_of_committed_tables(tmp_path):
@@ -137,6 +138,56 @@ def test_the_committed_leaderboard_is_made_of_committed_tables(tmp_path):
     leaderboard.write(tmp_path)
     for name in (leaderboard.PAGE, leaderboard.TABLE):
         assert (tmp_path / name).read_text() == (COMMITTED / name).read_text(), name
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_scores_follow_from_the_anchors_that_a_report_prints(name):
+    """Each score of a committed report, as a reader computes it."""
+    page = (COMMITTED / name / report.REPORT).read_text()
+    section = page.partition("## Final returns")[2].partition("## Sample efficiency")[0]
+    _, _, *lines = [line.strip("| ").split(" | ") for line in section.splitlines() if line.startswith("|")]
+    means = {}
+    for place, label, *_, returns, _, _, score, _, notes in lines:
+        if notes.startswith("anchor "):
+            assert " +- " in returns and score in ("0.00", "1.00")
+            means[place, notes, label == "standing still"] = float(returns.split(" +- ")[0])
+    for place, label, steps, *_, returns, _, _, score, _, notes in lines:
+        if steps == "-":
+            continue
+        episodes = 10 if "ten episodes" in notes else 100
+        kinds = [f"anchor for {episodes} episodes"]
+        if "judged on seeds from 0 on" not in notes:
+            kinds.append("anchor of the benchmark")
+        (kind,) = (kind for kind in kinds if (place, kind, True) in means)
+        zero, best = means[place, kind, True], means[place, kind, False]
+        assert float(score) == pytest.approx((float(returns) - zero) / (best - zero), abs=0.0052), (place, label)
+
+
+def test_runs_of_before_say_so_and_judged_ones_do_not():
+    judged = set()
+    for name in NAMES:
+        judged |= {(name, row["run"]) for row in csv_files.read(COMMITTED / name / results.FINALS)}
+    for name in NAMES:
+        published = COMMITTED / name
+        for result in results.read_results(catalog.committed_study(name, published).runs, published):
+            is_judged = (name, result.run.name) in judged
+            assert (results.SEEN_SEEDS in result.notes) != is_judged, (name, result.run.name)
+            assert results.NOT_JUDGED not in result.notes
+    rows = csv_files.read(COMMITTED / leaderboard.TABLE, leaderboard.HEADS)
+    noted = {row["study"] for row in rows if results.SEEN_SEEDS in row["notes"]}
+    assert noted == set(NAMES) - {name for name, _ in judged}
+
+
+def test_the_leaderboard_and_the_benchmark_have_one_score():
+    """That of the mean over seeds, and the same notes on runs of before."""
+    for name in NAMES:
+        division, _, learner = name.partition("-")
+        scores = benchmark.read(COMMITTED).get((division, learner), [])
+        for row in leaderboard.study_rows(name, COMMITTED / name) if scores else ():
+            place_scores = [score for score in scores if str(score.setup) == row["robot, task"]]
+            mean = sum(score.score for score in place_scores) / len(place_scores)
+            assert row["score"] == f"{mean:z.2f}"
+            assert {score.notes or "-" for score in place_scores} == {row["notes"]}
 
 
 @pytest.mark.long
