@@ -43,7 +43,7 @@ class RunScore(NamedTuple):
         first_seed: seed of the first episode that judges it.
         notes: reasons why the score is not comparable with others; empty without any.
         physics_sha256: hash of the model in which the run learned, or in which a policy was judged; empty if unknown.
-        task_kwargs: settings of the task as JSON where they are not those of the place; empty otherwise.
+        task_kwargs: settings of the task as JSON; empty for those of the place.
     """
 
     robot: str
@@ -106,8 +106,13 @@ def _score_result(result: RunResult) -> RunScore:
         first_seed=result.seeds[0] if len(result.seeds) else 0,
         notes="; ".join(result.notes),
         physics_sha256=result.physics_sha256,
-        task_kwargs=json.dumps(dict(setup.task_kwargs)) if result.other_settings else "",
+        task_kwargs=settings_cell(setup),
     )
+
+
+def settings_cell(setup: Setup) -> str:
+    """Return the settings of a setup's task as JSON."""
+    return json.dumps(dict(setup.task_kwargs))
 
 
 def style_fields(setup: Setup, metrics: Mapping[str, np.ndarray]) -> dict[str, float]:

@@ -17,7 +17,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors, judging, provenance
 from arc_suite.learning import finals
 from arc_suite.learning.studies import results
-from arc_suite.learning.studies.benchmark import STYLE, RunScore, style_fields
+from arc_suite.learning.studies.benchmark import STYLE, RunScore, settings_cell, style_fields
 from arc_suite.learning.studies.divisions import PLACES, SEEDS, place_setup
 from arc_suite.policies import Policy, frozen, named, network, other_libraries, separate
 from arc_suite.policies.frozen import Frozen
@@ -152,7 +152,12 @@ def score_lines(facts: Mapping[str, Any], lines: finals.Lines) -> RunScore:
     for metric in STYLE:
         cells = [line[column] for line in lines if (column := results.STYLE + metric) in line]
         metrics[metric] = np.array(cells, float)
-    values = {"result": mean_return, "score": float(scale.score(mean_return)), "minutes": np.nan}
+    values = {
+        "result": mean_return,
+        "score": float(scale.score(mean_return)),
+        "minutes": np.nan,
+        "task_kwargs": settings_cell(setup),
+    }
     return RunScore(**{**facts, **values, **style_fields(setup, metrics)})
 
 
