@@ -1,7 +1,9 @@
 """The packages on which results depend, and the line that says how to get them."""
 
 import contextlib
+import functools
 import hashlib
+import subprocess
 import sys
 import sysconfig
 import traceback
@@ -14,12 +16,27 @@ REQUIREMENTS = {"mujoco": ">=3.17,<3.18", "dm-control": "==1.0.50", "gymnasium":
 _IMPORTED_PACKAGES = ("absl", "dm_control", "dm_env", "gym", "gymnasium", "mujoco", "numpy", "shimmy", "tqdm")
 
 _RECORDED_PACKAGES = ("arc_suite", "mujoco", "dm_control", "numpy")
+_TIMEOUT = 10.0  # s, of git
 
 
 def clone_folder() -> Path | None:
     """Return the folder of the repository's clone that contains this package; None for an installed package."""
     folder = Path(__file__).parents[1]
     return folder if (folder / "setup.cfg").exists() else None
+
+
+@functools.cache
+def commit_of_clone() -> str | None:
+    """Return the commit of the clone, with "-dirty" where files differ from it; None without a clone or without git."""
+    folder = clone_folder()
+    if folder is None or not (folder / ".git").exists():
+        return None
+    command = ["git", "-C", str(folder), "describe", "--always", "--dirty", "--exclude=*"]
+    try:
+        result = subprocess.run(command, capture_output=True, encoding="utf-8", timeout=_TIMEOUT)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return result.stdout.strip() if result.returncode == 0 else None
 
 
 class MissingExtra(ImportError, ValueError):

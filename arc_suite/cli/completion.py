@@ -10,26 +10,42 @@ anew for those of a later version.
 zsh needs `fpath+=~/.zfunc` before `compinit` in ~/.zshrc.
 """
 
+import contextlib
+import pkgutil
 from collections.abc import Callable, Mapping
 
-from arc_suite import checks, policies
+from arc_suite import checks, policies, versions
 from arc_suite.arenas import ARENAS
 from arc_suite.cli.flag_names import flag_names
-from arc_suite.cli.programs import PROGRAMS, WORDS, installed_programs, program_summary
-from arc_suite.robots import ROBOTS
+from arc_suite.cli.programs import (
+    NAMES_OF_ARGUMENTS,
+    NAMES_OF_FLAGS,
+    PROGRAMS,
+    WORDS,
+    installed_programs,
+    program_summary,
+)
+from arc_suite.models.builder import CAMERAS
+from arc_suite.robots import ROBOTS, palettes
 from arc_suite.robots.spec_files import EXAMPLES
 from arc_suite.tasks import TASKS
 
 _SHELLS = ("bash", "zsh", "fish")
 
-# Names that flags take, by flag. Other values may be files.
+# Names that flags take, by flag, in addition to those of `NAMES_OF_FLAGS`. Other values may be files.
+_ROBOTS = (*ROBOTS, *EXAMPLES)
 _NAMES_OF_FLAGS = {
-    "robot": (*ROBOTS, *EXAMPLES),
+    "robot": _ROBOTS,
     "spec": tuple(EXAMPLES),
     "task": tuple(TASKS),
     "policy": tuple(policies.POLICIES),
     "arena": tuple(ARENAS),
+    "camera": CAMERAS,
+    "palette": tuple(palettes.PALETTES),
+    "preset": policies.preset_names(),
 }
+# Names that programs take without a flag, by program, in addition to those of `NAMES_OF_ARGUMENTS`.
+_NAMES_OF_ARGUMENTS = {"check": _ROBOTS, "completion": _SHELLS, "help": tuple(PROGRAMS)}
 
 _BASH = """\
 _arc_suite() {{
@@ -44,10 +60,6 @@ _arc_suite() {{
     fi
     if [ "$COMP_CWORD" = 1 ]; then
         words="{programs}"
-    elif [ "${{COMP_WORDS[1]}}" = help ]; then
-        words="{helped}"
-    elif [ "${{COMP_WORDS[1]}}" = completion ] && [ "${{word#-}}" = "$word" ]; then
-        words="{shells}"
     elif [ "${{word#-}}" != "$word" ]; then
         case ${{COMP_WORDS[1]}} in
 {flags}
@@ -55,6 +67,10 @@ _arc_suite() {{
     else
         case $flag in
 {names}
+        -*) ;;
+        *) case ${{COMP_WORDS[1]}} in
+{arguments}
+        esac ;;
         esac
     fi
     COMPREPLY=($(compgen -W "$words" -- "$word"))
@@ -69,10 +85,6 @@ _arc_suite() {{
     local word=$words[CURRENT] flag=$words[CURRENT-1]
     if (( CURRENT == 2 )); then
         compadd -- {programs}
-    elif [[ $words[2] == help ]]; then
-        compadd -- {helped}
-    elif [[ $words[2] == completion && $word != -* ]]; then
-        compadd -- {shells}
     elif [[ $word == -* && $word != *=* ]]; then
         case $words[2] in
 {flags}
@@ -84,7 +96,11 @@ _arc_suite() {{
         fi
         case $flag in
 {names}
+        -*) _files ;;
+        *) case $words[2] in
+{arguments}
         *) _files ;;
+        esac ;;
         esac
     fi
 }}
@@ -130,14 +146,31 @@ def _zsh_script() -> str:
 def _fill(template: str, complete_flags: Callable[[str], str], complete_names: Callable[[tuple], str]) -> str:
     """Return a script with a case for each program and for each flag that takes names."""
     cases_of_programs = {program: complete_flags(program) for program in PROGRAMS}
-    cases_of_flags = {f"--{flag}": complete_names(names) for flag, names in _NAMES_OF_FLAGS.items()}
+    cases_of_flags = {f"--{flag}": complete_names(names) for flag, names in _names_of_flags().items()}
+    cases_of_arguments = {program: complete_names(names) for program, names in _names_of_arguments().items()}
     return template.format(
         programs=" ".join(_first_words()),
-        helped=" ".join(PROGRAMS),
-        shells=" ".join(_SHELLS),
         flags=_case_lines(cases_of_programs),
         names=_case_lines(cases_of_flags),
+        arguments=_case_lines(cases_of_arguments),
     )
+
+
+def _names_of_flags() -> dict[str, tuple[str, ...]]:
+    return _NAMES_OF_FLAGS | _import_names(NAMES_OF_FLAGS)
+
+
+def _names_of_arguments() -> dict[str, tuple[str, ...]]:
+    return _NAMES_OF_ARGUMENTS | _import_names(NAMES_OF_ARGUMENTS)
+
+
+def _import_names(paths: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
+    """Return names by the key of the `module:attribute` that holds them, except those of extras not installed."""
+    names = {}
+    for key, path in paths.items():
+        with contextlib.suppress(versions.MissingExtra):
+            names[key] = tuple(pkgutil.resolve_name(path))
+    return names
 
 
 def _case_lines(commands: Mapping[str, str]) -> str:
@@ -148,14 +181,15 @@ def _fish_script() -> str:
     lines = []
     for word, summary in _first_words().items():
         lines.append(f"complete -c arc-suite -f -n __fish_use_subcommand -a {word} -d {_quote(summary)}")
-    for word, names in {"help": tuple(PROGRAMS), "completion": _SHELLS}.items():
+    names_of_flags = _names_of_flags()
+    for word, names in _names_of_arguments().items():
         lines.append(f"complete -c arc-suite -f -n '__fish_seen_subcommand_from {word}' -a '{' '.join(names)}'")
     for program in PROGRAMS:
         condition = f"-n '__fish_seen_subcommand_from {program}'"
         for flag in flag_names(program):
             short_name = f" -s {flag.short_name}" if flag.short_name else ""
             value = " -r" if flag.takes_value else ""
-            names = _NAMES_OF_FLAGS.get(flag.name, ())
+            names = names_of_flags.get(flag.name, ())
             names_of_flag = f" -a '{' '.join(names)}'" if names else ""
             lines.append(f"complete -c arc-suite {condition} -l {flag.name}{short_name}{value}{names_of_flag}")
     return "\n".join([*lines, ""])

@@ -10,6 +10,7 @@ from typing import NoReturn
 from absl import flags
 
 from arc_suite import checks, policies, registry
+from arc_suite.cli.flag_cures import CURES, CURES_OF_MISSING_VALUES, CURES_OF_PROGRAMS
 from arc_suite.tasks import TASKS
 
 DASHES = "-\u2013\u2014"  # also those that word processors write in place of two
@@ -27,50 +28,11 @@ _VIEWERS = {
     ".html": "a browser shows a page",
 }
 
-# Answers to flags of other programs, which no flag of this suite replaces.
-_RESUME = "the same command goes on where it was interrupted"
-_DEVICE = "learners compute on the device of JAX; see docs/gpu.md"
-_CURES = {
-    "continue": _RESUME,
-    "resume": _RESUME,
-    "cuda": _DEVICE,
-    "device": _DEVICE,
-    "gpu": _DEVICE,
-    "gravity": "environment.change_model sets it, see docs/environments.md",
-    "name": "arc-suite build_model --name NAME --json writes a spec with a name of its own",
-    "format": "the extension of the output is its format",
-}
-# Flags whose values a shell changes, unless they are quoted.
-_CURES_OF_MISSING_VALUES = {"palette": "a shell drops what follows a #: quote the colors, --palette='#3a5f2b'"}
+# Names of flags that may mean several of ours: the value says which.
+_VAGUE_NAMES = ("agent", "controller", "file", "filename", "input", "load", "method", "model", "name", "path", "type")
 # Flags of which users expect all values, where the last one holds, and the programs that show one creature.
 _FLAGS_OF_ONE = ("robot", "spec")
 _PROGRAMS_OF_ONE = ("animate", "play", "render", "studio", "view")
-_FORM_OF_BODIES = "docs/bodies.md: heads, tails and ballast"
-_COUNT_OF_BODIES = "--bodies bounds the search"
-_CURES_OF_PROGRAMS = {
-    "animate": {"frames": "a clip lasts a whole cycle; --fps sets its pictures"},
-    "build_model": dict.fromkeys(("ballast", "density", "head", "mass", "tail", "torso"), _FORM_OF_BODIES),
-    "check": {"fix": "arc-suite studio --spec FILE has a button for the value that fits"},
-    "completion": {"install": "its output goes into a file; see --help"},
-    "design": {
-        "spec": "did you mean --around?",
-        "legs": "the search chooses legs; --around keeps those of a creature",
-        "minutes": _COUNT_OF_BODIES,
-        "n": _COUNT_OF_BODIES,
-        "t": _COUNT_OF_BODIES,
-    },
-    "doctor": {"fix": "its lines say what to do"},
-    "play": {"task": "a page has the task of its policy"},
-    "render": {
-        "background": "arc-suite animate --transparent writes a picture of a clip without a background",
-        "i": "did you mean --spec or --policy?",
-        "r": "did you mean --fps?",
-        "size": "did you mean --width and --height?",
-        "t": "did you mean --steps?",
-        "transparent": "arc-suite animate --transparent writes a picture of a clip without a background",
-        "y": "files are written over",
-    },
-}
 
 
 def refuse_unknown(
@@ -91,18 +53,22 @@ def refuse_unknown(
     """
     name = error.flagname
     _, _, value = error.flagvalue.partition("=")
-    cure = _CURES_OF_PROGRAMS.get(program, {}).get(name)
+    cure = CURES_OF_PROGRAMS.get(program, {}).get(name)
     if cure is not None:
         raise ValueError(f"unknown flag {checks.preview(name)}; {cure}") from None
+    value = value or _value_behind(arguments, name)
     _refuse_name_of_value(name, value, names)
     if len(name) == 1:
         long_names = [f"--{long_name}" for long_name in names if long_name[0] == name]
         if long_names:
             raise ValueError(f"unknown flag '-{name}'; did you mean {' or '.join(long_names)}?") from None
-    value = value or _value_behind(arguments, name)
     _refuse_name_of_argument(name, value, parameters)
-    if name in _CURES:
-        raise ValueError(f"unknown flag {checks.preview(name)}; {_CURES[name]}") from None
+    flag_of_value = _flag_that_takes(value) if name in _VAGUE_NAMES else ""
+    if flag_of_value:
+        cure = f"did you mean --{flag_of_value}={checks.quote(value)}?"
+        raise ValueError(f"unknown flag {checks.preview(name)}; {cure}") from None
+    if name in CURES:
+        raise ValueError(f"unknown flag {checks.preview(name)}; {CURES[name]}") from None
     checks.name(name, names, "flag")  # raises a ValueError that suggests a name
 
 
@@ -125,8 +91,8 @@ def refuse_value(error: flags.IllegalFlagValueError) -> None:
 def refuse_missing_value(error: flags.Error) -> None:
     """Raise ValueError for a flag without its value, if a shell drops such values; `error` is that of absl."""
     name = str(error).rpartition("-")[2]
-    if name in _CURES_OF_MISSING_VALUES:
-        raise ValueError(f"{error}; {_CURES_OF_MISSING_VALUES[name]}") from None
+    if name in CURES_OF_MISSING_VALUES:
+        raise ValueError(f"{error}; {CURES_OF_MISSING_VALUES[name]}") from None
 
 
 def refuse_flag_as_value(flag: flags.Flag) -> None:
@@ -134,7 +100,7 @@ def refuse_flag_as_value(flag: flags.Flag) -> None:
     for text in flag.value if isinstance(flag.value, list) else [flag.value]:
         match = _FLAG.fullmatch(text) if isinstance(text, str) else None
         if match and match[1] in flags.FLAGS:
-            cure = _CURES_OF_MISSING_VALUES.get(flag.name)
+            cure = CURES_OF_MISSING_VALUES.get(flag.name)
             hint = f"; {cure}" if cure else ""
             raise ValueError(f"--{flag.name}: expected a value, got the flag {checks.quote(text)}{hint}")
 
@@ -250,8 +216,16 @@ def _join_values(flag: flags.Flag, values: Sequence[str]) -> str:
         return ""
     if not isinstance(flag.parser, flags.ListParser) and _SEVERAL.search(flag.help) is None:
         return ""
+    if any(_is_name_of_another_flag(text, flag) for text in values):
+        return ""
     list_text = ",".join(text.strip(",") for text in values if text.strip(","))
     return f"did you mean --{flag.name}={list_text}? a list has commas and no spaces; "
+
+
+def _is_name_of_another_flag(text: str, flag: flags.Flag) -> bool:
+    """Return whether a text is a task, a policy or an algorithm behind a flag of others, as in --robot tick walk."""
+    is_name = text in (*TASKS, *policies.POLICIES) or _is_in_help("algorithm", text)
+    return is_name and not _is_in_help(flag.name, text)
 
 
 def _join_settings(flag_name: str, values: Sequence[str]) -> str:
@@ -274,14 +248,24 @@ def _suggest_flag(argument: str) -> str:
     extension = os.path.splitext(argument)[1].lower()
     if extension in _VIEWERS and os.path.exists(argument):
         return f"{_VIEWERS[extension]}; "
-    flag_takes_argument = {
-        "robot": argument in registry.robot_words(),
-        "task": argument in TASKS,
+    flag = _flag_that_takes(argument)
+    return f"did you mean --{flag}={argument}? " if flag else ""
+
+
+def _flag_that_takes(value: str) -> str:
+    """Return the name of the flag of the program whose value a text may be; "" for none."""
+    extension = os.path.splitext(value)[1].lower()
+    flag_takes_value = {
+        "robot": value in registry.robot_words(),
+        "task": value in TASKS,
+        "algorithm": _is_in_help("algorithm", value),
         "spec": extension in (".json", *registry.READERS),
-        "policy": argument in policies.POLICIES or os.path.isdir(argument) or extension in _POLICY_EXTENSIONS,
-        "output": extension != "" and not os.path.exists(argument),
+        "policy": value in policies.POLICIES or os.path.isdir(value) or extension in _POLICY_EXTENSIONS,
+        "output": extension != "" and not os.path.exists(value),
     }
-    for flag, takes_argument in flag_takes_argument.items():
-        if takes_argument and flag in flags.FLAGS:
-            return f"did you mean --{flag}={argument}? "
-    return ""
+    return next((flag for flag, takes_value in flag_takes_value.items() if takes_value and flag in flags.FLAGS), "")
+
+
+def _is_in_help(flag_name: str, word: str) -> bool:
+    """Return whether the help of a flag lists a word, as it lists names; False without the flag."""
+    return flag_name in flags.FLAGS and word in re.findall(r"[\w-]+(?=[,.:;]| or )", flags.FLAGS[flag_name].help)

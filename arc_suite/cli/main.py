@@ -2,6 +2,7 @@
 
 import importlib
 import sys
+from collections.abc import Sequence
 from types import ModuleType
 
 from arc_suite import checks, registry, versions
@@ -27,7 +28,7 @@ def main(*arguments: str) -> None:
         program_arguments = ["--help"]
     # `guard` and `run` exit the process.
     if program_name in ("version", "--version", "-V"):
-        program.guard(lambda: print(describe_suite()), "arc-suite")
+        program.guard(lambda: _print_version(program_arguments), "arc-suite")
     elif program_name in _HELP_WORDS:
         program.guard(lambda: print(usage()), "arc-suite")
     elif program_name in PROGRAMS:
@@ -35,6 +36,12 @@ def main(*arguments: str) -> None:
     else:
         module = _program_of_another_package(program_name)
     program.run(module.main, f"arc-suite {program_name}", program_arguments)
+
+
+def _print_version(arguments: Sequence[str]) -> None:
+    if arguments:
+        raise ValueError(f"unexpected argument {checks.preview(arguments[0])}; version takes none")
+    print(describe_suite())
 
 
 def _import_program(name: str) -> ModuleType:

@@ -35,7 +35,7 @@ def main(file: str | None = None) -> None:
     """Read the motion, make it one of the body, write it, and print a line for each thing that was changed."""
     if file is None:
         raise ValueError("expected a file of a motion; see --help")
-    extension = checks.extension(file, reading.EXTENSIONS)
+    extension = reading.check_extension(file)
     check_flags_suit_file(extension, reading.OPTIONS)
     if FLAGS.output is not None:
         checks.extension(FLAGS.output, [motion_files.EXTENSION])

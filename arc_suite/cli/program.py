@@ -29,6 +29,7 @@ _FLAG_NAME = re.compile(r"(?<=^--)[a-z][a-z_-]*")  # after the two dashes at the
 _GRACE_PERIOD = 20.0  # s, from SIGTERM to the end of the process; clusters give 30 s
 _LOG_INTERVAL = 30.0  # s, between two lines of progress in a log
 _EXPECTED_ERRORS = (flags.Error, ValueError, OSError, MemoryError, RenderingUnavailable, PhysicsError)
+_SPECIAL_FLAG = re.compile(r"--?(flagfile|undefok)(=.*)?", re.DOTALL)  # which absl itself takes in every program
 _CURSOR_MOVES = re.compile("\\r|\x1b\\[A")  # with which bars overwrite themselves
 
 _HELP = flags.DEFINE_bool("help", False, "Print this text and exit.", short_name="h")
@@ -198,7 +199,9 @@ def _parse(arguments: Sequence[str], module: ModuleType, parameters: Sequence[st
     program_flags = list(_flags_of(module))
     program = module.__name__.rpartition(".")[2]
     try:
-        positional_arguments = flags.FLAGS(with_underscores)
+        _refuse_special_flags(with_underscores)
+        positional_arguments = _flags_except_of_absl()(with_underscores)
+        flags.FLAGS.mark_as_parsed()
     except flags.UnrecognizedFlagError as error:
         names = sorted({flag.name for flag in program_flags})
         flag_mistakes.refuse_unknown(error, program, names, with_underscores, parameters)
@@ -216,6 +219,28 @@ def _parse(arguments: Sequence[str], module: ModuleType, parameters: Sequence[st
             flag_mistakes.refuse_flag_as_value(flag)
     flag_mistakes.warn_of_repeated_flags(program, with_underscores)
     return positional_arguments
+
+
+def _refuse_special_flags(arguments: Sequence[str]) -> None:
+    """Raise UnrecognizedFlagError for a flag that absl itself would take: its files of flags may hold any flag."""
+    for argument in arguments:
+        match = _SPECIAL_FLAG.fullmatch(argument)
+        if match:
+            raise flags.UnrecognizedFlagError(match[1], argument)
+
+
+def _flags_except_of_absl() -> flags.FlagValues:
+    """Return all flags except those of absl's modules, such as --logtostderr, which would have no effect.
+
+    They stay in `absl.flags.FLAGS`, as the log of absl reads them.
+    """
+    parsed_flags = flags.FlagValues()
+    parsed_flags.set_gnu_getopt(flags.FLAGS.is_gnu_getopt())
+    for module_name, module_flags in flags.FLAGS.flags_by_module_dict().items():
+        if not module_name.startswith("absl."):
+            for flag in module_flags:
+                parsed_flags[flag.name] = flag
+    return parsed_flags
 
 
 def _flags_of(module: ModuleType) -> Iterator[flags.Flag]:

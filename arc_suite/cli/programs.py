@@ -35,6 +35,15 @@ PROGRAMS = {
     "completion": "arc_suite.cli",
 }
 
+# Where the names are that a flag takes, and that a program takes as its argument; completion alone imports them.
+NAMES_OF_FLAGS = {
+    "algorithm": "arc_suite.learning.agents.algorithms:ALGORITHMS",
+    "clips": "arc_suite.animation.clips:CLIPS",
+    "rig": "arc_suite.animation.clips:RIGS",
+    "root_motion": "arc_suite.animation.clips:ROOT_MOTIONS",
+}
+NAMES_OF_ARGUMENTS = {"benchmark": "arc_suite.learning.studies.divisions:DIVISIONS"}
+
 # Further first arguments, and what they do.
 WORDS = {"help": "Show the programs, or the flags of a program.", "version": "Print the version and the folder."}
 

@@ -61,7 +61,10 @@ def text(run: Configuration, folder: Path) -> str:
         table(("what", "value"), _describe(run, folder, returns, episodes_text)),
         *pictures,
         "## Use",
-        _code("sh", next_commands(run.policy_setup, folder)),
+        _installation_text(folder),
+        _code("sh", ["pip install -e '.[animate]'"]),
+        "The commands run in the folder that holds the folder of this card.",
+        _code("sh", next_commands(run.policy_setup, Path(folder.resolve().name), has_pages=False)),
         "## How it was made",
         _code("sh", [_training_command(run)]),
         "`config.json` has all settings and hyperparameters.",
@@ -155,9 +158,18 @@ def _describe_origin(folder: Path) -> Iterator[tuple[str, str]]:
     for name, value in record.items():
         if name.endswith("_sha256") and isinstance(value, str):
             yield f"{name.removesuffix('_sha256')}, sha256", f"`{value}`"
+    if run_folder.COMMIT in record:
+        yield "commit of arc_suite", f"`{record[run_folder.COMMIT]}`"
     for package, version in record.get("versions", {}).items():
         if version is not None:
             yield package, str(version)
+
+
+def _installation_text(folder: Path) -> str:
+    """Return the sentence that says where the suite is installed."""
+    commit = run_folder.read_config(folder).get(run_folder.COMMIT)
+    at_commit = f", at the commit `{commit.removesuffix('-dirty')}`" if isinstance(commit, str) else ""
+    return f"Install the suite in a clone of its repository{at_commit}."
 
 
 def _training_command(run: Configuration) -> str:

@@ -1,5 +1,6 @@
 """Outcomes of runs as text: returns and scores, and when a run reached a score."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -46,6 +47,22 @@ def latest_result(run: Configuration, folder: Path) -> str:
     """Return the return and the score of a run's latest evaluation as text."""
     table = run_folder.table(folder, "evaluations")
     return _describe_returns(run, run_folder.latest_returns(table)) if table else "no evaluation yet"
+
+
+def best_run(runs: Sequence[Configuration], folder: Path) -> Configuration | None:
+    """Return the run whose latest evaluation has the largest mean return; None without an evaluation.
+
+    Args:
+        runs: runs of one setup.
+        folder: folder that holds the folders of the runs.
+    """
+
+    def latest_return(run: Configuration) -> float:
+        table = run_folder.table(folder / run.name, "evaluations")
+        return run_folder.latest_returns(table).mean() if table else -math.inf
+
+    best = max(runs, key=latest_return, default=None)
+    return None if best is None or latest_return(best) == -math.inf else best
 
 
 def mean(runs: Sequence[Configuration], folder: Path) -> str:

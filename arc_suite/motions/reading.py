@@ -20,6 +20,8 @@ OPTIONS = {  # extensions of the files that take an option
     "fps": (tables.EXTENSION, motion_files.EXTENSION),
 }
 
+_EXTENSIONS_FOR_BLENDER = (".blend", ".dae", ".fbx", ".gltf", ".usd", ".usda", ".usdc", ".usdz")
+
 _MIN_EXCESS = np.radians(1.0)  # rad, beyond the range of a joint
 
 
@@ -38,6 +40,20 @@ class Options(NamedTuple):
 
 
 NO_OPTIONS = Options()
+
+
+def check_extension(path: str | os.PathLike[str]) -> str:
+    """Return the extension of a file of a motion, in lower case.
+
+    Raises:
+        ValueError: the file has another extension, or none. The message names a program that converts it, if any does.
+    """
+    try:
+        return checks.extension(path, EXTENSIONS)
+    except ValueError as error:
+        if Path(path).suffix.lower() not in _EXTENSIONS_FOR_BLENDER:
+            raise
+        raise ValueError(f"{error}; Blender reads it, and writes a .glb or a .bvh") from None
 
 
 def holds_motion(path: str | os.PathLike[str]) -> bool:
@@ -63,7 +79,7 @@ def read(
         ValueError: an unknown kind of file, a damaged file, or one of another body; one line.
         OSError: the file cannot be read.
     """
-    extension = checks.extension(path, EXTENSIONS)
+    extension = check_extension(path)
     if holds_motion(path):
         return motion_files.load(path), []
     if body is None:

@@ -18,7 +18,7 @@ _METHODS = ("act", "predict", "select_action", "get_action")  # by which agents 
 _AS_FUNCTION = "write a function that loads it, and name it as file.py:function"
 # By extension of a file that is no policy: what the file is, and what to do instead.
 _HINTS = {
-    ".onnx": "it is for other programs; expected the folder of the run that it comes from",
+    ".onnx": f"it is for other programs; expected the folder of the run that it comes from; else {_AS_FUNCTION}",
     ".json": "it is no policy; expected the folder of a run",
     ".csv": "it is no policy; expected the folder of a run",
     ".pt": _AS_FUNCTION,
@@ -52,10 +52,13 @@ def refuse_other_files(name: str | os.PathLike[str]) -> None:
 
 
 def refuse_other_words(name: Any, policy_names: Iterable[str]) -> None:
-    """Raise ValueError for a robot, a task or a preset in place of a policy, and for a misspelled folder."""
+    """Raise ValueError for a robot, a task or a preset in place of a policy, or for a misspelled folder or file."""
     for kind, names in {"robot": registry.robot_words(), "task": TASKS, "preset": preset_names()}.items():
         if isinstance(name, str) and name in names:
             raise ValueError(f"policy {name!r}: it is a {kind}; expected as {kind}, next to a policy such as cpg")
+    if isinstance(name, str) and os.path.isfile(f"{name}.py"):
+        first_name, *_ = [*_list_functions(Path(f"{name}.py")), f"{name}.py:NAME"]
+        raise ValueError(f"unknown policy {checks.preview(name)}; did you mean {first_name}?")
     hint = files.suggest_path(name) if isinstance(name, str) and not checks.hint(name, policy_names) else ""
     if hint:
         raise ValueError(f"unknown policy {checks.preview(name)}{hint}")
@@ -63,6 +66,14 @@ def refuse_other_words(name: Any, policy_names: Iterable[str]) -> None:
 
 def _refuse_file_of_python(path: Path) -> NoReturn:
     """Raise ValueError that lists the functions and classes of a file, which is not run."""
+    names = _list_functions(path)
+    name_list = f" (there are: {', '.join(names[:_MAX_NAMES])})" if names else ""
+    expected = "a function in it that makes a policy from a robot's name"
+    raise ValueError(checks.quote(f"policy '{path}': expected {path}:NAME, {expected}{name_list}"))
+
+
+def _list_functions(path: Path) -> list[str]:
+    """Return the functions and classes of a file of Python as names of policies; the file is not run."""
     with files.reading(path):
         size = path.stat().st_size
         source = path.read_bytes() if size <= _MAX_SIZE else b""
@@ -71,10 +82,7 @@ def _refuse_file_of_python(path: Path) -> NoReturn:
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         statements = []
     kinds = (ast.FunctionDef, ast.ClassDef)
-    names = [f"{path}:{node.name}" for node in statements if isinstance(node, kinds) and node.name[0] != "_"]
-    name_list = f" (there are: {', '.join(names[:_MAX_NAMES])})" if names else ""
-    expected = "a function in it that makes a policy from a robot's name"
-    raise ValueError(checks.quote(f"policy '{path}': expected {path}:NAME, {expected}{name_list}"))
+    return [f"{path}:{node.name}" for node in statements if isinstance(node, kinds) and node.name[0] != "_"]
 
 
 def _refuse_folder_of_runs(path: Path) -> None:

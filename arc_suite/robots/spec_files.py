@@ -24,6 +24,7 @@ MAX_IMPORTED = MAX_BYTES + 2 * MAX_SOURCE  # bytes of a file with a source; its 
 EXAMPLES = {path.stem: path for path in sorted(Path(__file__).with_name("examples").glob("*.json"))}
 
 # Files of other kinds, by extension, and JSON of other kinds, by a key that it has.
+_OTHER_FORMAT = "a robot for another simulator, whose maker may have a .urdf or .xml, too"
 _KINDS_OF_FILES = {
     ".glb": "clips",
     ".fbx": "clips",
@@ -33,6 +34,9 @@ _KINDS_OF_FILES = {
     ".npz": "arrays, such as a policy or a motion",
     ".onnx": "a policy",
     ".zip": "an archive",
+    **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz", ".sdf"), _OTHER_FORMAT),
+    **dict.fromkeys((".obj", ".stl", ".dae", ".ply"), "a mesh, without joints"),
+    ".xacro": "a template of a .urdf, which the program xacro makes",
 }
 _KINDS_OF_JSON = {
     "sketch": "a design: open it in arc-suite studio, and save its spec",

@@ -18,6 +18,15 @@ LINES = {
     "arc-suite train --robot qu": ("train --robot qu", {"queen"}),
     "arc-suite render --task ste": ("render --task ste", {"steer"}),
     "arc-suite design --policy x": ("design --policy x", set()),
+    "arc-suite train --algorithm drq": ("train --algorithm drq", set()),
+    "arc-suite train --algorithm dro": ("train --algorithm dro", {"droq"}),
+    "arc-suite evaluate --preset ref": ("evaluate --preset ref", {"refined"}),
+    "arc-suite animate --clips att": ("animate --clips att", {"attack"}),
+    "arc-suite animate --rig no": ("animate --rig no", {"nodes"}),
+    "arc-suite render --camera por": ("render --camera por", {"portrait"}),
+    "arc-suite render --palette mo": ("render --palette mo", {"moss"}),
+    "arc-suite check sp": ("check sp", {"spider"}),
+    "arc-suite render --output sp": ("render --output sp", set()),
 }
 
 

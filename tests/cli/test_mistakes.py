@@ -249,6 +249,8 @@ FIRST_HOUR = {
     "card runs/tick/policy.npz": "runs/tick/policy.npz: no folder of a run; did you mean runs/tick?\n",
     "style --compare=clip.glb": "policy 'clip.glb': it is no policy; expected the folder of a run\n",
     "style --compare=tick": "policy 'tick': it is a robot; expected as robot, next to a policy such as cpg\n",
+    "import go2.usd": "go2.usd: expected a body, .json, .xml or .urdf; a .usd holds a robot for another simulator, ",
+    "version extra": "arc-suite: unexpected argument 'extra'; version takes none\n",
     "tick": "arc-suite: tick: expected a program first, such as arc-suite evaluate --robot=tick\n",
     "walk": "arc-suite: walk: expected a program first, such as arc-suite evaluate --task=walk\n",
 }

@@ -19,9 +19,37 @@ INTEGER = "expected an integer in the range [1, 100000]"
 BARE = "is an argument without a flag"
 INSTEAD = 'walk has weights={"forward": 2} in its place\n'
 SPAN = "expected a number from 0 to 100, or two of them, the lower first"
+AMOUNT = "programs have one amount of output; 2>/dev/null hides progress and warnings\n"
+FURTHER = "--algorithm finetune --hp start=RUN trains the policy of a run further\n"
 LINES = {
+    "evaluate --log_dir=a": "unknown flag 'log_dir'; did you mean 'json'? (there are: ",
+    "train --log_dir=a": "unknown flag 'log_dir'; did you mean 'output'? (there are: ",
+    "evaluate --v=2": "unknown flag '-v'; did you mean --vecnormalize or --version?\n",
+    "evaluate --logtostderr": f"unknown flag 'logtostderr'; {AMOUNT}",
+    "evaluate --verbosity 3": f"unknown flag 'verbosity'; {AMOUNT}",
+    "evaluate --flagfile=x": "unknown flag 'flagfile'; write its flags into the command; arc-suite train --config ",
+    "evaluate --undefok=a": "unknown flag 'undefok' (there are: arena, ",
+    "train walk": "unexpected argument 'walk'; did you mean --task=walk? see --help\n",
+    "train --robot tick walk": "unexpected argument 'walk'; did you mean --task=walk? see --help\n",
+    "train sac": "unexpected argument 'sac'; did you mean --algorithm=sac? see --help\n",
+    "train --agent=ppo": "unknown flag 'agent'; did you mean --algorithm=ppo?\n",
+    "train --model ppo": "unknown flag 'model'; did you mean --algorithm=ppo?\n",
+    "train --model=spider.json": "unknown flag 'model'; did you mean --spec=spider.json?\n",
+    "train --ent_coef=0.01": "unknown flag 'ent_coef'; in its place ppo has --hp initial_std and final_std, sac has ",
+    "train --hp ent_coef=0.01": "unknown hyperparameter 'ent_coef'; did you mean 'initial_std'? (there are: ",
+    "train --headless": "unknown flag 'headless'; arc-suite view alone opens a window\n",
+    "train --eval_freq 100": "unknown flag 'eval_freq'; did you mean 'evaluate_every'? (there are: ",
+    "train --save_freq=9": "unknown flag 'save_freq'; a run saves its policy at each evaluation, see --evaluate_e",
+    "train --load=runs/a": f"unknown flag 'load'; {FURTHER}",
+    "train --wandb_project=a": "unknown flag 'wandb_project'; Weights & Biases reads variables: WANDB_PROJECT, ",
+    "train --video": "unknown flag 'video'; arc-suite render films the policy of a run, arc-suite view shows it\n",
+    "train --lr 3e-4": "unknown flag 'lr'; did you mean --hp learning_rate=3e-4 or --hp policy_rate=3e-4?\n",
+    "train --steps=100,000": "flag --steps=100,000: expected a positive integer; did you mean --steps=100000?\n",
+    "benchmark samples --wandb": "unknown flag 'wandb'; arc-suite train has --tensorboard and --wandb, for a run of ",
+    "evaluate --policy=pol": "unknown policy 'pol'; did you mean pol.py:Agent?\n",
+    "motion walk.fbx": "unknown extension '.fbx' (there are: .npz, .glb, .bvh, .csv); Blender reads it, and writes a ",
     "train --lr=1e-4": "unknown flag 'lr'; did you mean --hp learning_rate=1e-4 or --hp policy_rate=1e-4?\n",
-    "train --gamma .9": "unknown flag 'gamma'; did you mean --hp discount=VALUE?\n",
+    "train --gamma .9": "unknown flag 'gamma'; did you mean --hp discount=.9?\n",
     "train --n_envs=8": "unknown flag 'n_envs'; did you mean --hp num_envs=8?\n",
     "train --batch-size=8": "unknown flag 'batch_size'; did you mean --hp minibatch=8 or --hp batch=8?\n",
     "train --hp lr=1e-4": "unknown hyperparameter 'lr'; did you mean 'policy_rate'? (there are: ",
@@ -103,6 +131,8 @@ def test_one_line_with_the_cure(command, folder):
     [
         ("1e5", "100000"),
         ("2M", "2000000"),
+        ("100,000", "100000"),
+        ("1,00", ""),
         (64.0, "64"),
         ("0.5k", "500"),
         ("1e-5", ""),

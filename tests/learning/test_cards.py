@@ -12,7 +12,7 @@ import pytest
 import tiny_studies
 
 import arc_suite
-from arc_suite import learning, registry
+from arc_suite import learning, registry, versions
 from arc_suite.learning import cards
 from arc_suite.learning.agents import configuration, run_folder
 from arc_suite.learning.agents.configuration import Configuration
@@ -47,8 +47,17 @@ def test_a_card_says_what_a_hub_and_a_reader_want(run, folder, monkeypatch):
     assert low <= mean <= high and mean == pytest.approx(returns.mean(), abs=0.05)
     assert "| steps | 20 of 20 |" in card and '| settings | `{"time_limit": 0.25}` |' in card
     assert re.search(r"\| score \| -?\d\.\d\d, 95 % interval \[", card)
-    assert f"arc-suite evaluate --policy {folder}" in card and f"\n{run.command}\n" in card
+    assert (
+        f"arc-suite evaluate --policy {folder.name}\n" in card
+        and str(folder) not in card
+        and f"\n{run.command}\n" in card
+    )
     assert re.search(r"policy, sha256 \| `[0-9a-f]{64}`", card) and "| mujoco | 3." in card
+    commit = json.loads((folder / "config.json").read_text()).get("commit")
+    assert commit == versions.commit_of_clone()
+    if commit is not None:
+        assert f"| commit of arc_suite | `{commit}` |" in card and f"commit `{commit.removesuffix('-dirty')}`." in card
+    assert "\npip install -e '.[animate]'\n" in card and "arc-suite play" not in card  # which needs `make web`
     assert "](picture.png)" not in card  # which was not drawn
     sha256 = hashlib.sha256(pathlib.Path(tiny_studies.__file__).read_bytes()).hexdigest()
     assert f"| module tiny_studies | sha256 {sha256} |" in card

@@ -8,15 +8,15 @@ import pytest
 
 from arc_suite.animation import play_pages
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.next_commands import next_commands
+from arc_suite.learning.next_commands import has_built_pages, next_commands
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 
 BLIND = {"exclude_blocks": ["contact_forces"]}
 
 
-def commands(setup, folder="runs/mine"):
-    return [command.removeprefix("arc-suite ") for command in next_commands(setup, pathlib.Path(folder))]
+def commands(setup, folder="runs/mine", has_pages=True):
+    return [command.removeprefix("arc-suite ") for command in next_commands(setup, pathlib.Path(folder), has_pages)]
 
 
 def test_of_a_run():
@@ -32,6 +32,19 @@ def test_of_many_bodies():
     policy = "--policy runs/mine"
     expected = [f"transfer {policy}", f"render --spec spider {policy} -o mine.mp4"]
     assert commands(Setup.of("varied:0-3", "walk")) == [*expected, f"play --spec spider {policy} -o mine.html"]
+
+
+def test_without_what_make_web_builds_the_last_opens_a_window(monkeypatch, tmp_path):
+    policy = "--policy runs/mine"
+    assert commands(Setup.of("tick", "walk"), has_pages=False)[2] == f"view {policy}"
+    assert commands(Setup.of("varied:0-3", "walk"), has_pages=False)[2] == f"view --spec spider {policy}"
+    for name in ("play", "view"):
+        programs.passed(programs.arc_suite(name, "--policy", "runs/mine", "--version"))
+    monkeypatch.setattr("arc_suite.learning.next_commands.source_path", lambda name: tmp_path / "cli" / f"{name}.py")
+    assert not has_built_pages()
+    (tmp_path / "web").mkdir()
+    (tmp_path / "web" / "play.js").touch()
+    assert has_built_pages()
 
 
 def test_folders_are_quoted_and_modules_are_named_again(tmp_path, monkeypatch):

@@ -15,7 +15,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms
 from arc_suite.learning.agents.hyperparameters import BLOCKS_LEFT_OUT
 from arc_suite.learning.agents.learner import MAX_RUN_SEED, RunContext
-from arc_suite.learning.agents.run_folder import LEG_VIEWS, MODEL_HASH, MODULE
+from arc_suite.learning.agents.run_folder import COMMIT, LEG_VIEWS, MODEL_HASH, MODULE
 from arc_suite.policies import network
 from arc_suite.simulation.model_hash import PHYSICS
 from arc_suite.tasks import leg_views
@@ -280,7 +280,9 @@ class Configuration:
             OSError: the file of a body cannot be read.
         """
         for name in fields:
-            checks.name(name, (*CONFIGURATION_FIELDS, *PROVENANCE_FIELDS, MODEL_HASH), "field of a configuration")
+            checks.name(
+                name, (*CONFIGURATION_FIELDS, *PROVENANCE_FIELDS, COMMIT, MODEL_HASH), "field of a configuration"
+            )
         if "robot" not in fields:
             raise ValueError("expected a robot, got none")
         for kind, name in _registered_names(fields):
@@ -317,6 +319,9 @@ class Configuration:
         fields["episodes"] = evaluation.CURVE_EPISODES
         modules = {f"{MODULE}{name}": versions.describe_module(name) for name in self.modules}
         fields["versions"] = provenance["versions"] | packages | modules
+        commit = versions.commit_of_clone()
+        if commit is not None:
+            fields[COMMIT] = commit
         if self._depends_on_leg_views():
             fields[LEG_VIEWS] = leg_views.VERSION
         return fields

@@ -29,11 +29,12 @@ LOCK = ".lock"
 TABLES = ("evaluations", "training", "times")
 LEG_VIEWS = "leg_views"  # name of a field of records: the version of what legs see; see `tasks.leg_views`
 MODEL_HASH = "model_sha256"  # in records of earlier versions, in place of `PHYSICS`; it differed among processors
+COMMIT = "commit"  # of the clone in which a run began; it may go on in another one
 MODULE = "module "  # begins names of other packages' modules among versions; records of earlier versions lack them
 
 _PROGRESS = "progress"  # name of the text in a checkpoint that is not the learner's
 _NUMBERS_OF_PROGRESS = {"evaluated", "wall", "cpu", "return"}  # those that a checkpoint may have
-_IGNORED_FIELDS = ("learner", MODEL_HASH)  # fields of records of earlier versions, which may differ
+_IGNORED_FIELDS = ("learner", MODEL_HASH, COMMIT)  # which may differ; the first two are of earlier versions
 _MAX_TABLE = 1 << 30  # bytes
 _MAX_CHECKPOINT_BYTES = 1 << 34  # unpacked; the labels of imitation are the largest part
 

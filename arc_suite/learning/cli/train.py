@@ -16,7 +16,7 @@ checkpoint, the policy, and a picture of its returns, drawn anew after each eval
   arc-suite train --config runs/queen-sope/config.json -o runs/queen-sope-again
   arc-suite train --robot varied:0-127 --algorithm dagger_bodies
 
-A run of one seed ends with the commands that score, film and play its policy.
+A run ends with the commands that score, film and play its policy. Of several seeds, it is the best one.
 """
 
 import contextlib
@@ -54,7 +54,7 @@ from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.hyperparameters import DEVICE_DEFAULTS
 from arc_suite.learning.agents.learner import MAX_RUN_SEED
 from arc_suite.learning.agents.training import train, train_in_one_program
-from arc_suite.learning.next_commands import next_commands
+from arc_suite.learning.next_commands import has_built_pages, next_commands
 from arc_suite.policies import network
 from arc_suite.simulation.cores import prepare_jax, usable_cores
 
@@ -217,17 +217,37 @@ def train_run(run: Configuration, threshold: float | None) -> int:
             step = success_step()
             terminated = is_terminated()
     is_complete = finished or step is not None
-    save_onnx(run, folder, is_complete)
+    has_policy = bool(run_folder.lines(folder, "evaluations"))
+    if has_policy:
+        save_onnx(run, folder)
     say(f"{folder}: {describe_end(folder, step, finished, terminated)}, {outcomes.latest_result(run, folder)}")
     if terminated:
         return TERMINATED
-    if is_complete:
-        with resumable(folder):
+    with resumable(folder):
+        if is_complete:
             play_final_episodes(run, folder, FLAGS.threads)
+        if has_policy:
             cards.write(run, folder)
-        if FLAGS["seed"].present <= 1:  # the log of one of several seeds ends with its result
-            print("next:", *next_commands(run.policy_setup, folder), sep="\n  ")
+    if has_policy and FLAGS["seed"].present <= 1:  # the log of one of several seeds ends with its result
+        print_next_commands(run, folder)
     return 0
+
+
+def print_next_commands(run: Configuration, folder: Path) -> None:
+    """Print the commands that a person wants after a training."""
+    print("next:", *next_commands(run.policy_setup, folder, has_built_pages()), sep="\n  ")
+
+
+def print_next_commands_of_best(runs: Sequence[Configuration], folder: Path) -> None:
+    """Print the commands for the seed with the best latest evaluation; nothing without one.
+
+    Args:
+        runs: runs of several seeds.
+        folder: folder that holds the folders of the runs.
+    """
+    best_run = outcomes.best_run(runs, folder)
+    if best_run is not None:
+        print_next_commands(best_run, folder / best_run.name)
 
 
 def describe_next_evaluation(run: Configuration, evaluated_step: int) -> str:
@@ -282,6 +302,7 @@ def train_seeds(runs: Sequence[Configuration]) -> int:
         failed_names = processes.run(commands, folder, FLAGS.jobs or usable_cores(), result, watch)
     successful_runs = [run for run in runs if run.name not in failed_names]
     print(f"{folder}: {outcomes.mean(successful_runs, folder)}")
+    print_next_commands_of_best(successful_runs, folder)
     return int(bool(failed_names))
 
 
@@ -297,17 +318,21 @@ def train_seeds_on_device(runs: Sequence[Configuration]) -> int:
     for run, run_folder_path in zip(runs, folders, strict=True):
         end = describe_end(run_folder_path, None, finished, terminated)
         print(f"{run_folder_path}: {end}, {outcomes.latest_result(run, run_folder_path)}")
-        save_onnx(run, run_folder_path, finished)
+        if run_folder.lines(run_folder_path, "evaluations"):
+            save_onnx(run, run_folder_path)
         if finished and not terminated:
             play_final_episodes(run, run_folder_path, threads=None)
             cards.write(run, run_folder_path)
     print(f"{folder}: {outcomes.mean(runs, folder)}")
-    return TERMINATED if terminated else 0
+    if terminated:
+        return TERMINATED
+    print_next_commands_of_best(runs, folder)
+    return 0
 
 
-def save_onnx(run: Configuration, folder: Path, is_complete: bool) -> None:
-    """Write the policy of a complete run of one body in ONNX's format, if ONNX is installed."""
-    if is_complete and importlib.util.find_spec("onnx") and not run.setup.several:
+def save_onnx(run: Configuration, folder: Path) -> None:
+    """Write the policy of a run of one body in ONNX's format, if ONNX is installed."""
+    if importlib.util.find_spec("onnx") and not run.setup.several:
         onnx_file.save(folder / "policy.onnx", network.load(folder))
 
 

@@ -123,7 +123,7 @@ def _run_row(run: Run, folder: Path) -> dict[str, str]:
     progress = run_folder.read_progress(folder)
     used = {name: progress[name] for name in (*usage.STEP_COUNTS, results.SOURCES) if name in progress}
     fields = {"run": run.name, "kind": run.kind, **run_folder.read_config(folder), "phases": phases or None, **used}
-    return {name: cell(value) for name, value in fields.items()}
+    return {name: cell(value) for name, value in fields.items() if name in RUN_COLUMNS}
 
 
 def cell(value: Any) -> str:

@@ -21,6 +21,7 @@ from refusals import refused
 from arc_suite import evaluation, policies, registry
 from arc_suite.evaluation import judging
 from arc_suite.learning.agents import configuration, run_folder
+from arc_suite.learning.next_commands import has_built_pages
 
 HAS_JAX = importlib.util.find_spec("jax") is not None
 ROOT = pathlib.Path(__file__).parents[3]
@@ -130,8 +131,8 @@ CLIMB += ["--evaluate_every=20"]
 REACHED = (
     r"run: score -100 reached at step 20, after \d+ s \(\d+ s of CPU time\), return \S+, deviation \S+, score \S+ \(.*"
 )
-NEXT = [f"arc-suite {program} --policy run" for program in ("evaluate", "render", "play")]
-NEXT = [NEXT[0], f"{NEXT[1]} -o run.mp4", f"{NEXT[2]} -o run.html"]
+NEXT = ["arc-suite evaluate --policy run", "arc-suite render --policy run -o run.mp4"]
+NEXT.append("arc-suite play --policy run -o run.html" if has_built_pages() else "arc-suite view --policy run")
 STOPPED = "other: stopped at --minutes=0 of CPU time; more minutes resume it, no evaluation yet\n"
 
 
@@ -152,6 +153,12 @@ def test_until_a_score(tmp_path):
         returns = np.array([float(row["return"]) for row in finals])
         line = f"run: judged in 100 episodes, seeds {finals[0]['seed']} on: {returns.mean():.1f} +- "
         assert judged.startswith(f"{line}{returns.std(ddof=1) / 10.0:.1f}, score ")
+    (tmp_path / "run" / "README.md").unlink()
+    done = run("train", *CLIMB, "--minutes=0", "-o", "run", cwd=tmp_path)
+    stopped, *following = done.stdout.splitlines()[-5:]
+    assert stopped.startswith("run: stopped at --minutes=0 of CPU time; more minutes resume it, return ")
+    assert following == ["next:", *(f"  {command}" for command in NEXT)]
+    assert (tmp_path / "run" / "README.md").is_file()
     done = run("train", *CLIMB, "--minutes=0", "-o", "other", cwd=tmp_path)
     assert done.stdout.endswith(STOPPED)
 
@@ -174,7 +181,9 @@ def test_several_seeds(tmp_path):
         assert f", return {each.mean():.1f}, deviation {each.std():.1f}, score " in line
         assert f"runs/{name}-{seed}: judged in 100 episodes, seeds 4" in lines[lines.index(line) + 1]
     means = [each.mean() for each in returns]
-    assert lines[-1].startswith(
+    best = f"runs/{name}-{(0, 2)[np.argmax(means)]}"
+    assert lines[-4:-2] == ["next:", f"  arc-suite evaluate --policy {best}"]
+    assert lines[-5].startswith(
         f"runs: mean of 2 seeds, return {np.mean(means):.1f}, deviation {np.std(means):.1f}, score "
     )
     assert run("train", *CLIMB, "--seed=2", "-o", "alone", cwd=tmp_path).returncode == 0

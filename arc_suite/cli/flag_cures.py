@@ -1,0 +1,70 @@
+"""Answers to flags of other programs and libraries, which no flag of the suite replaces."""
+
+_RESUME = "the same command goes on where it was interrupted"
+_DEVICE = "learners compute on the device of JAX; see docs/gpu.md"
+_WINDOW = "arc-suite view alone opens a window"
+_AMOUNT = "programs have one amount of output; 2>/dev/null hides progress and warnings"
+CURES = {
+    **dict.fromkeys(("continue", "resume"), _RESUME),
+    **dict.fromkeys(("cpu", "cuda", "device", "gpu", "use_gpu"), _DEVICE),
+    **dict.fromkeys(("gui", "headless", "no_render", "nogui", "offscreen"), _WINDOW),
+    **dict.fromkeys(("debug", "log_level", "quiet", "silent", "verbose", "verbosity"), _AMOUNT),
+    **dict.fromkeys(("alsologtostderr", "logtostderr", "stderrthreshold"), _AMOUNT),
+    **dict.fromkeys(("deterministic", "stochastic"), "the policy of a run acts by its mean action"),
+    **dict.fromkeys(("render", "render_mode"), "arc-suite render films a policy, arc-suite view shows it"),
+    "flagfile": "write its flags into the command; arc-suite train --config takes the configuration of a run",
+    "format": "the extension of the output is its format",
+    "gravity": "environment.change_model sets it, see docs/environments.md",
+    "name": "arc-suite build_model --name NAME --json writes a spec with a name of its own",
+    "overwrite": "files are written over; a run goes on in its folder",
+}
+# Flags whose values a shell changes, unless they are quoted.
+CURES_OF_MISSING_VALUES = {"palette": "a shell drops what follows a #: quote the colors, --palette='#3a5f2b'"}
+
+_FORM_OF_BODIES = "docs/bodies.md: heads, tails and ballast"
+_COUNT_OF_BODIES = "--bodies bounds the search"
+_TRACKERS = "arc-suite train has --tensorboard and --wandb, for a run of --config"
+_CHECKPOINTS = "a run saves its policy at each evaluation, see --evaluate_every"
+_FILM = "arc-suite render films the policy of a run, arc-suite view shows it"
+_FURTHER = "--algorithm finetune --hp start=RUN trains the policy of a run further"
+_WANDB = "Weights & Biases reads variables: WANDB_PROJECT, WANDB_ENTITY, WANDB_MODE, next to --wandb"
+_NO_BACKGROUND = "arc-suite animate --transparent writes a picture of a clip without a background"
+CURES_OF_PROGRAMS = {
+    "animate": {"frames": "a clip lasts a whole cycle; --fps sets its pictures"},
+    "benchmark": dict.fromkeys(("tensorboard", "wandb"), _TRACKERS),
+    "build_model": dict.fromkeys(("ballast", "density", "head", "mass", "tail", "torso"), _FORM_OF_BODIES),
+    "check": {"fix": "arc-suite studio --spec FILE has a button for the value that fits"},
+    "completion": {"install": "its output goes into a file; see --help"},
+    "design": {
+        "spec": "did you mean --around?",
+        "legs": "the search chooses legs; --around keeps those of a creature",
+        "minutes": _COUNT_OF_BODIES,
+        "n": _COUNT_OF_BODIES,
+        "t": _COUNT_OF_BODIES,
+    },
+    "doctor": {"fix": "its lines say what to do"},
+    "play": {"task": "a page has the task of its policy"},
+    "render": {
+        "background": _NO_BACKGROUND,
+        "i": "did you mean --spec or --policy?",
+        "r": "did you mean --fps?",
+        "size": "did you mean --width and --height?",
+        "t": "did you mean --steps?",
+        "transparent": _NO_BACKGROUND,
+        "y": "files are written over",
+    },
+    "study": dict.fromkeys(("tensorboard", "wandb"), _TRACKERS),
+    "train": {
+        **dict.fromkeys(("checkpoint_every", "checkpoint_freq", "save_every", "save_freq"), _CHECKPOINTS),
+        **dict.fromkeys(("save_interval", "save_model"), _CHECKPOINTS),
+        **dict.fromkeys(("capture_video", "play", "record_video", "render", "video", "view", "watch"), _FILM),
+        **dict.fromkeys(("checkpoint", "ckpt", "load", "load_run", "load_model", "pretrained"), _FURTHER),
+        **dict.fromkeys(("wandb_entity", "wandb_mode", "wandb_name", "wandb_project"), _WANDB),
+        **dict.fromkeys(
+            ("activation", "optimizer"), "networks and optimizers are of the algorithm; see docs/algorithms.md"
+        ),
+        "ent_coef": "in its place ppo has --hp initial_std and final_std, sac has --hp target_entropy",
+        "vf_coef": "the critic of ppo has a learning rate in its place, --hp value_rate",
+        "torch_deterministic": "runs are the same to the last bit on one machine",
+    },
+}
