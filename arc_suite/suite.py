@@ -8,7 +8,7 @@ Attributes:
 
 import sys
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from arc_suite import registry
 from arc_suite.envs.dm import load
@@ -19,11 +19,12 @@ ALL_TASKS: tuple[tuple[str, str], ...]  # of __getattr__, as packages register f
 TASKS_BY_DOMAIN: Mapping[str, tuple[str, ...]]
 BENCHMARKING = registry.BENCHMARKING
 
+if not TYPE_CHECKING:  # for checkers every name would exist
 
-def __getattr__(name: str) -> Any:
-    match name:
-        case "ALL_TASKS":
-            return registry.all_tasks()
-        case "TASKS_BY_DOMAIN":
-            return registry.tasks_by_domain()
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name, obj=sys.modules[__name__])
+    def __getattr__(name: str) -> Any:
+        match name:
+            case "ALL_TASKS":
+                return registry.all_tasks()
+            case "TASKS_BY_DOMAIN":
+                return registry.tasks_by_domain()
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name, obj=sys.modules[__name__])

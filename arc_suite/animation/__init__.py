@@ -12,8 +12,9 @@ _MODULE_OF_NAME = {"animate": "arc_suite.animation.clips", "show": "arc_suite.an
 
 __all__ = ["animate", "show"]
 
+if not TYPE_CHECKING:  # for checkers every name would exist
 
-def __getattr__(name: str) -> Any:
-    if name in _MODULE_OF_NAME:  # imported here, as programs do not need all that these import
-        return getattr(importlib.import_module(_MODULE_OF_NAME[name]), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name, obj=sys.modules[__name__])
+    def __getattr__(name: str) -> Any:
+        if name in _MODULE_OF_NAME:  # imported here, as programs do not need all that these import
+            return getattr(importlib.import_module(_MODULE_OF_NAME[name]), name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name, obj=sys.modules[__name__])

@@ -8,7 +8,7 @@ A law of a demonstrator is a pure function `(state, observation) -> (state, acti
 """
 
 from collections.abc import Iterable, Mapping
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -22,8 +22,10 @@ class Law(Protocol):
         reads: names of the blocks of the observation that it needs, `posture` and `velocities` among them.
     """
 
-    preset: ClassVar[Any]
-    reads: tuple[str, ...]
+    @property
+    def preset(self) -> Any: ...
+    @property
+    def reads(self) -> tuple[str, ...]: ...
 
     def __init__(self, task, preset):
         """Fit the law to a task.

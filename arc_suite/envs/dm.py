@@ -4,11 +4,9 @@ import collections
 import functools
 import os
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from dm_control.rl import control
-from dm_env import specs
 from numpy.typing import ArrayLike
 
 from arc_suite import checks, usage
@@ -30,6 +28,13 @@ from arc_suite.simulation.physics import Physics
 from arc_suite.tasks import Task, privileged, terms
 from arc_suite.tasks.contract import LEVEL
 from arc_suite.tasks.readings import root_qpos, root_qvel
+
+if TYPE_CHECKING:
+    from arc_suite.envs import dm_types as control
+    from arc_suite.envs import dm_types as specs
+else:
+    from dm_control.rl import control
+    from dm_env import specs
 
 _FLAT = "observations"  # dm_control's name of a flat observation
 
@@ -98,9 +103,14 @@ class Environment(KnownAttributes, control.Environment):
         task_kwargs: the settings with which `load` opened the task.
     """
 
-    if TYPE_CHECKING:  # dm_control leaves its type open
+    if TYPE_CHECKING:  # dm_env and dm_control leave these types open
 
         def control_timestep(self) -> float: ...
+        def reward_spec(self) -> specs.Array: ...
+        def discount_spec(self) -> specs.BoundedArray: ...
+        def close(self) -> None: ...
+        def __enter__(self) -> Self: ...
+        def __exit__(self, *error: object) -> None: ...
 
     def __init__(self, physics: Physics, run: "TaskRun", task_kwargs: Mapping[str, Any]):
         """Combine a task's run and its simulation; `load` makes both."""

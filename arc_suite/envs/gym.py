@@ -5,7 +5,7 @@ import sys
 import types
 import weakref
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -14,20 +14,38 @@ from numpy.typing import ArrayLike
 
 from arc_suite import checks, usage, versions
 from arc_suite.envs.calls import KnownAttributes, one_thread_at_a_time
-from arc_suite.envs.dm import TaskRun, load
+from arc_suite.envs.dm import Environment, TaskRun, load
 from arc_suite.envs.prepare import checked_limit, refuse_arguments
 from arc_suite.envs.window import Window
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import opengl, pictures
+from arc_suite.simulation.annotations import MjData, MjModel
 
 with versions.explain_import_errors():  # shimmy imports `gym`, and a user's own file may have that name
     from shimmy.dm_control_compatibility import DmControlCompatibilityV0
     from shimmy.utils.dm_env import dm_env_step2gym_step
 
+if TYPE_CHECKING:
+    from arc_suite.envs import dm_types as specs
+    from arc_suite.simulation.physics import Physics
+
+    class _Adapter(gymnasium.Env[np.ndarray, np.ndarray]):
+        """shimmy's adapter, which has no types: whatever inherits from it seems to have every attribute."""
+
+        _env: Environment
+        render_kwargs: dict[str, Any]
+        dt: float
+
+        def __init__(self, env: Environment, render_kwargs: Mapping[str, Any]) -> None: ...
+        def render(self) -> np.ndarray | None: ...  # type: ignore[override]
+
+else:
+    _Adapter = DmControlCompatibilityV0
+
 _HEADLESS_MODES = ("rgb_array", "depth_array")
 
 
-class Env(KnownAttributes, DmControlCompatibilityV0):
+class Env(KnownAttributes, _Adapter):
     """One task of the suite, made by `gymnasium.make("arc_suite/<robot>-<task>-v0", ...)`.
 
     Observations are the flat vector of the dm_env rounded to float32, actions are float32 in
@@ -51,6 +69,18 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
 
     observation_space: gymnasium.spaces.Box
     action_space: gymnasium.spaces.Box
+
+    if TYPE_CHECKING:  # the adapter hands on what the dm_env has
+
+        @property
+        def unwrapped(self) -> "Env": ...
+        @property
+        def physics(self) -> Physics: ...
+        @property
+        def task_kwargs(self) -> Mapping[str, Any]: ...
+        def action_spec(self) -> specs.BoundedArray: ...
+        def observation_spec(self) -> Mapping[str, specs.Array]: ...
+        def control_timestep(self) -> float: ...
 
     _np_random_seed = usage.UNKNOWN_SEED  # until a seed is given
 
@@ -133,6 +163,16 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
     def task(self) -> TaskRun:
         """The task; its `split` gives an observation's blocks by name."""
         return self._env.task
+
+    @property
+    def data(self) -> MjData:
+        """The `mujoco.MjData` of the simulation, as in Gymnasium's MuJoCo environments."""
+        return self._env.physics.data.ptr
+
+    @property
+    def model(self) -> MjModel:
+        """The `mujoco.MjModel` of the simulation, as in Gymnasium's MuJoCo environments."""
+        return self._env.physics.model.ptr
 
     @property
     def np_random(self) -> np.random.Generator:

@@ -2,7 +2,7 @@
 
 import collections
 from collections.abc import Mapping
-from typing import Any, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import dm_env
 import gymnasium
@@ -11,9 +11,24 @@ import numpy as np
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task
 from arc_suite.tasks.contract import Scene
+from arc_suite.tasks.parameters import Parameters
 
 # An environment of `arc_suite.load`, `gymnasium.make` or `gymnasium.make_vec`, in wrappers or not.
 AnyEnvironment: TypeAlias = dm_env.Environment | gymnasium.Env[Any, Any] | gymnasium.vector.VectorEnv[Any, Any, Any]
+
+
+class TaskSettings(Protocol):
+    """Settings of a task: its class has further ones, and those of a task without a gait have no `parameters`.
+
+    Attributes:
+        parameters: the gait, the standing pose and the target velocity.
+        weights: signed weight of every term of the reward.
+    """
+
+    parameters: Parameters
+    weights: Mapping[str, float]
+
+    def __getattr__(self, name: str) -> Any: ...
 
 
 class TaskView:
@@ -43,7 +58,7 @@ class TaskView:
         return self.definition.scene
 
     @property
-    def settings(self) -> Any:
+    def settings(self) -> TaskSettings:
         """The settings of the task."""
         return self.definition.settings
 

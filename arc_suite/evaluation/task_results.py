@@ -49,7 +49,7 @@ def check_results(setup: Setup) -> None:
     _check_demonstrators(definition)
     action = np.full(len(task.scene.body.joint_names), 0.1)
     _check_step(task, memory, readings, action, ())
-    _check_step(task, *(_repeat(tree) for tree in (memory, readings, action)), (_NUM_ENVS,))
+    _check_step(task, _repeat(memory), _repeat(readings), _repeat(action), (_NUM_ENVS,))
     for name in vars(definition).keys() - known_attributes:
         if not isinstance(getattr(type(definition), name, None), functools.cached_property):
             raise ValueError(

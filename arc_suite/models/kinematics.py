@@ -83,7 +83,7 @@ class Legs(NamedTuple):
 
     def choose(self, indices: np.ndarray) -> Self:
         """Return the legs with these indices (legs,)."""
-        return self._make(values[indices] for values in self)
+        return type(self)(*(values[indices] for values in self))
 
     def widen_ranges(self, angles: np.ndarray) -> Self:
         """Return the legs with joint ranges that hold angles (samples, legs, links); limits in the physics are soft."""

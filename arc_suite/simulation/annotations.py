@@ -1,18 +1,28 @@
 """Types of a simulation's data and model, for editors and type checkers: MuJoCo's and dm_control's own have none."""
 
-from typing import Any, Protocol
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING, Any, Protocol
 
 import mujoco
 import numpy as np
 
+if TYPE_CHECKING:
+    from arc_suite.simulation.mujoco_types import FurtherDataFields, FurtherModelFields
+else:  # programs do not need the names of all fields
 
-class Data(Protocol):
-    """The state of a simulation and what follows from it, `physics.data`: `mujoco.MjData` as dm_control wraps it.
+    class FurtherDataFields(Protocol):
+        """See `mujoco_types`."""
 
-    All of its fields are there; these are those that programs read most. Arrays are live.
+    class FurtherModelFields(Protocol):
+        """See `mujoco_types`."""
+
+
+class MjData(FurtherDataFields, Protocol):
+    """The state of a simulation and what follows from it, for functions of `mujoco`; arrays are live.
+
+    These are the fields that programs read most; the others are there, too.
 
     Attributes:
-        ptr: the data itself, for functions of `mujoco`.
         time: s.
         ncon: number of contacts.
         qpos, qvel, qacc: positions, velocities and accelerations of the joints; the torso's come first.
@@ -30,7 +40,6 @@ class Data(Protocol):
         sensordata: readings of sensors.
     """
 
-    ptr: mujoco.MjData
     time: float
     ncon: int
     qpos: np.ndarray
@@ -57,16 +66,29 @@ class Data(Protocol):
     mocap_quat: np.ndarray
     sensordata: np.ndarray
 
-    def __getattr__(self, name: str) -> Any: ...
 
-
-class Model(Protocol):
-    """The model of a simulation, `physics.model`: `mujoco.MjModel` as dm_control wraps it.
-
-    All of its fields are there; these are those that programs read most. Arrays are live.
+class Data(MjData, Protocol):
+    """The data of a simulation as dm_control wraps them, `physics.data`.
 
     Attributes:
-        ptr: the model itself, for functions of `mujoco`.
+        ptr: the data itself, for functions of `mujoco`.
+    """
+
+    ptr: mujoco.MjData
+
+    def contact_force(self, contact_id: int) -> np.ndarray: ...
+    def object_velocity(
+        self, object_id: int | str, object_type: int | str, local_frame: bool = False
+    ) -> np.ndarray: ...
+    def copy(self) -> "Data": ...
+
+
+class MjModel(FurtherModelFields, Protocol):
+    """The model of a simulation, for functions of `mujoco`; arrays are live.
+
+    These are the fields that programs read most; the others are there, too.
+
+    Attributes:
         nq, nv, nu: numbers of positions, velocities and controls.
         nbody, njnt, ngeom, nsite, nsensor, npair: numbers of bodies, joints, geoms, sites, sensors and pairs of geoms.
         body_mass, body_inertia, body_ipos, body_iquat: masses, kg, inertias and where they are.
@@ -78,7 +100,6 @@ class Model(Protocol):
         key_qpos, qpos0: poses of keyframes, and the one in which the model is written.
     """
 
-    ptr: mujoco.MjModel
     nq: int
     nv: int
     nu: int
@@ -111,7 +132,25 @@ class Model(Protocol):
     key_qpos: np.ndarray
     qpos0: np.ndarray
 
-    def __getattr__(self, name: str) -> Any: ...
+
+class Model(MjModel, Protocol):
+    """The model of a simulation as dm_control wraps it, `physics.model`.
+
+    Attributes:
+        ptr: the model itself, for functions of `mujoco`.
+        name: name of the model.
+    """
+
+    ptr: mujoco.MjModel
+    name: str
+
+    def name2id(self, name: str, object_type: int | str) -> int: ...
+    def id2name(self, object_id: int, object_type: int | str) -> str: ...
+    def disable(self, *flags: int | str) -> AbstractContextManager[None]: ...
+    def copy(self) -> "Model": ...
+    def free(self) -> None: ...
+    def to_bytes(self) -> bytes: ...
+    def save_binary(self, path: str) -> None: ...
 
 
 class NamedField(Protocol):

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable, Mapping
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
-from dm_control import mujoco as dm_mujoco
 from dm_control.mujoco import wrapper
+from numpy.typing import ArrayLike
 
 from arc_suite import checks
 from arc_suite.arenas import FLAT, Arena
@@ -20,6 +21,11 @@ from arc_suite.simulation import forks, pictures, timers
 from arc_suite.simulation.annotations import Data, Model, Named
 from arc_suite.simulation.model import change_fields, compile_model, field, merge_lasting, shared_model
 from arc_suite.simulation.state_arrays import LASTING_PREFIX, MODEL_PREFIX, check_snapshot, model_fields
+
+if TYPE_CHECKING:
+    from arc_suite.simulation import mujoco_types as dm_mujoco
+else:
+    from dm_control import mujoco as dm_mujoco
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
@@ -65,6 +71,15 @@ class Physics(dm_mujoco.Physics):
         def position(self) -> np.ndarray: ...
         def get_state(self, sig: int | None = None) -> np.ndarray: ...
         def set_state(self, physics_state: np.ndarray, sig: int | None = None) -> None: ...
+        def set_control(self, control: ArrayLike) -> None: ...
+        def activation(self) -> np.ndarray: ...
+        def state(self) -> np.ndarray: ...
+        def forward(self) -> None: ...
+        def check_divergence(self) -> None: ...
+        def check_invalid_state(self) -> AbstractContextManager[None]: ...
+        def suppress_physics_errors(self) -> AbstractContextManager[None]: ...
+        def reset_context(self) -> AbstractContextManager[Physics]: ...
+        def enable_profiling(self) -> None: ...
 
     @classmethod
     def from_body(cls, body: Body, arena: Arena = FLAT) -> Physics:

@@ -120,7 +120,7 @@ class Decorated(dm_mujoco.Physics):
         mocap_pos: np.ndarray | None = None,
         markers: Iterable[Marker] = (),
         failed_legs: Iterable[str] = (),
-        swings: Sequence[np.ndarray] | None = None,
+        swings: Sequence[np.ndarray] | np.ndarray | None = None,
     ) -> None:
         """Take a pose and show a reward.
 
@@ -145,7 +145,7 @@ class Decorated(dm_mujoco.Physics):
         model.material("glow").rgba = self._glow if share is None else visuals.reward_color(share)
         self.darken(failed_legs)
 
-    def _turn_ornaments(self, swings: Sequence[np.ndarray] | None) -> None:
+    def _turn_ornaments(self, swings: Sequence[np.ndarray] | np.ndarray | None) -> None:
         """Turn ornaments about their pivots; see `pose`."""
         model = self.model.ptr
         for geom in self._swinging_geoms:
@@ -235,7 +235,7 @@ def picture(
     mocap_pos: np.ndarray | None = None,
     markers: Iterable[Marker] = (),
     failed_legs: Iterable[str] = (),
-    swings: Sequence[np.ndarray] | None = None,
+    swings: Sequence[np.ndarray] | np.ndarray | None = None,
     quality: str | None = None,
     **kwargs,
 ) -> np.ndarray:

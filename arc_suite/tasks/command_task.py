@@ -149,7 +149,7 @@ class CommandTask(GaitTask):
     gait_and_pose: ClassVar[GaitAndPose | None] = None
     ground: ClassVar[Ground] = Level()
     health: ClassVar[Upright] = Upright()
-    weights: ClassVar[Mapping[str, float]] = {
+    weights: ClassVar[dict[str, float]] = {
         "progress": 0.5,
         "tracking": 1.5,
         "healthy": 1.0,
@@ -159,7 +159,7 @@ class CommandTask(GaitTask):
     yaw: ClassVar[float] = math.pi
     demonstrators: ClassVar[tuple[str, ...]] = ("steered",)
 
-    def __init_subclass__(cls, **kwargs):
+    def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
         cls.own_arena = cls.ground.own_arena
 
@@ -194,7 +194,7 @@ class CommandTask(GaitTask):
         return settings.ground.arena(body, settings.parameters)
 
     @functools.cached_property
-    def blocks(self) -> Mapping[str, Block]:
+    def blocks(self) -> dict[str, Block]:
         """The paper's observation, the command and the measured motion, and the blocks that command and ground add."""
         body = self.scene.body
         gait = self.parameters

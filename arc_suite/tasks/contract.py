@@ -47,6 +47,19 @@ from arc_suite.tasks.parameters import Parameters
 from arc_suite.tasks.readings import Readings
 from arc_suite.tasks.scene import Inputs, Scene, Start
 
+__all__ = [
+    "CURRICULUM",
+    "LEVEL",
+    "STEPS",
+    "FileSetting",
+    "Inputs",
+    "Observed",
+    "Readings",
+    "Scene",
+    "Start",
+    "Task",
+]
+
 STEPS = 1000  # control steps of an episode
 
 # Settings of a curriculum: whether there is one, and the level at which it begins. Evaluation leaves them out.

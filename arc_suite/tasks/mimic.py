@@ -121,7 +121,7 @@ class Mimic(Task):
     modifiers = {"actions": "position"}
     demonstrators = ("tracked",)
     file_settings = {"motion": FileSetting(motion_text.embed, motion_text.names_file, motion_text.label)}
-    weights: ClassVar[Mapping[str, float]] = {
+    weights: ClassVar[dict[str, float]] = {
         "pose": 1.5,
         "joint_speed": 0.25,
         "feet": 0.5,

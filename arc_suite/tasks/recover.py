@@ -81,7 +81,7 @@ class Recover(Task):
     training = {"fall_seed": _LEARNING_SEED, "time_limit": 10.0}
     # Attributes that follow from the body; see `Task.from_body`.
     from_body = ("clearances", "height", "_force_unit", "hold_steps")
-    weights: ClassVar[Mapping[str, float]] = {
+    weights: ClassVar[dict[str, float]] = {
         "upright": 1.0,
         "height": 1.0,
         "up": 1.0,

@@ -1,6 +1,5 @@
 """The twelve tasks with a command: each is a command on a ground, with its own numbers."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from arc_suite.tasks.command import AlongLane, Schedule, ToGoal
@@ -48,7 +47,7 @@ class Directed(CommandTask):
     gait_and_pose = GaitAndPose()
     from_body = _FROM_BODY
     demonstrators = ("posed", "steered")
-    weights: ClassVar[Mapping[str, float]] = {
+    weights: ClassVar[dict[str, float]] = {
         "progress": 0.25,
         "tracking": 0.25,
         "healthy": 1.0,
@@ -142,7 +141,7 @@ class Navigate(CommandTask):
     ground = PillarField()
     from_body = _FROM_BODY
     demonstrators = ("planned",)
-    weights: ClassVar[Mapping[str, float]] = {
+    weights: ClassVar[dict[str, float]] = {
         "progress": 1.5,
         "healthy": 1.0,
         "obedient_gait": 2.5,

@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -62,6 +62,9 @@ class WalkMemory(NamedTuple):
     energy: energy.Energy
 
 
+_Memory = TypeVar("_Memory", bound=WalkMemory)  # a task that extends walk may remember more
+
+
 class Walk(GaitTask):
     """Walking forward at the target speed in the prescribed gait."""
 
@@ -69,7 +72,7 @@ class Walk(GaitTask):
     # Attributes that follow from the body; see `Task.from_body`.
     from_body = ("clock", "clearances", "_torques", "_heat")
     # Section 4 of the paper. Each robot replaces "control" by a weight of its own.
-    weights: ClassVar[Mapping[str, float]] = {
+    weights: ClassVar[dict[str, float]] = {
         "forward": 1.5,
         "healthy": 1.0,
         "gait_bonus": 1.5,
@@ -143,7 +146,7 @@ class Walk(GaitTask):
         """Return the memory with the action, and the action itself as what to write."""
         return memory._replace(action=action, previous_action=memory.action), Inputs(action)
 
-    def after(self, memory: WalkMemory, readings: Readings) -> WalkMemory:
+    def after(self, memory: _Memory, readings: Readings) -> _Memory:
         """Advance the clock, and measure the step's displacement and contact schedule errors."""
         tick = memory.tick + 1
         x = component(readings.frame_position, 0) + 0.0  # a copy

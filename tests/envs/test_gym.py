@@ -7,6 +7,7 @@ import warnings
 
 import gymnasium
 import interpreters
+import mujoco
 import numpy as np
 import pytest
 from episodes import flat
@@ -453,3 +454,11 @@ def test_gymnasium_records_films(tmp_path):
         for _ in range(3):
             recorded.step(recorded.action_space.sample())
     assert [path.name for path in tmp_path.glob("films/*.mp4")] == ["tick-episode-0.mp4"]
+
+
+def test_data_and_model_are_those_of_mujoco():
+    env = gymnasium.make("arc_suite/tick-walk-v0")
+    env.reset(seed=0)
+    mujoco.mj_forward(env.unwrapped.model, env.unwrapped.data)
+    assert env.unwrapped.data is env.unwrapped.physics.data.ptr
+    assert env.unwrapped.model is env.unwrapped.physics.model.ptr

@@ -29,6 +29,12 @@ def test_import_is_light():
     assert interpreters.printed(code) == ["[]"]
 
 
+@pytest.mark.parametrize("name", ["learning.train", "evaluation.evaluate", "animation.animate", "style.measure"])
+def test_functions_are_there_without_an_import_of_their_package(name):
+    """As docs/programs.md writes them."""
+    assert interpreters.printed(f"import arc_suite; print(arc_suite.{name}.__name__)") == [name.split(".")[1]]
+
+
 # Loads a robot, and plays a step with its demonstrator.
 _STEP = """
 import sys

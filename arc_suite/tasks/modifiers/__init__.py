@@ -25,6 +25,26 @@ from arc_suite.tasks.modifiers.pushes import Pushes
 from arc_suite.tasks.modifiers.sensors import Sensors
 from arc_suite.tasks.modifiers.sensors_only import SensorsOnly
 
+__all__ = [
+    "MODIFIERS",
+    "SUITE_MODIFIERS",
+    "Contacts",
+    "Control",
+    "Delay",
+    "ExcludedBlocks",
+    "History",
+    "Kicks",
+    "Masses",
+    "Modifier",
+    "Motors",
+    "ObservationNoise",
+    "Pushes",
+    "Sensors",
+    "SensorsOnly",
+    "bounds",
+    "fit_modifiers",
+]
+
 # The suite's modifiers, from the body outwards. A modified task has all of them.
 SUITE_MODIFIERS: tuple[type[Modifier], ...] = (
     Contacts,
