@@ -55,7 +55,7 @@ MODULE_OF_NAME = {}
 BENCHMARKING = (
     *(("queen", "walk"), ("bastion", "walk"), ("tick", "walk"), ("leaper", "walk")),
     *(("queen", "steer"), ("tick", "steer"), ("leaper", "steer")),
-    *(("tick", "rough"), ("queen", "stairs"), ("tick", "navigate")),
+    *(("tick", "rough"), ("queen", "gaps"), ("tick", "navigate")),
 )
 
 SETTINGS_OF_EVERY_TASK = ("time_limit", "arena", "random", "on_divergence")

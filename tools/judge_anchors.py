@@ -28,7 +28,7 @@ BEST_LAWS = {
     "walk": "refined",
     "steer": "reactive",
     "rough": "sighted",
-    "stairs": "surefooted",
+    "gaps": "sighted",
     "navigate": "planned",
 }
 SHARE = len(judging.ANCHOR_SEEDS) // judging.GROUNDS  # seeds of a line

@@ -9,12 +9,12 @@ from arc_suite.envs.setup import Setup
 SEEDS = 3  # of every place
 
 PLACES = registry.BENCHMARKING  # robot and task of each place
-# Settings of places where they are not those of the task: ground on which a blind walker fails.
+# Settings of places where they are not those of the task: ground on which walkers without sight fail.
 SETTINGS: Mapping[tuple[str, str], Mapping[str, Any]] = {
     ("tick", "rough"): {"rise": 0.126},  # m, 0.7 standing heights
-    ("queen", "stairs"): {"difficulty": 0.85},
+    ("queen", "gaps"): {"difficulty": 0.8},
 }
-FAR = ("rough", "slopes", "stairs", "navigate")  # tasks that take more steps: uneven ground and pillars
+FAR = ("rough", "slopes", "stairs", "gaps", "navigate")  # tasks that take more steps: uneven ground and pillars
 TURNING = ("steer", "navigate")  # tasks with commands that turn: a heading error says nothing there
 
 
