@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from arc_suite import seed_ranges
+from arc_suite.cpg.selection import law, preset_of
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors, judging
 from arc_suite.evaluation.judging import Part
@@ -65,6 +66,8 @@ def test_committed_anchors_are_those_of_places():
 
 @pytest.mark.parametrize("place", [place for place in SETTINGS if judging.levels(place_setup(*place)) is not None])
 def test_ground_of_the_benchmark_asks_for_sight(place):
-    """A blind walker, trained on flat ground, has less than half of the score of the best law."""
-    scale = anchors.anchors(place_setup(*place))
+    """A blind walker, trained on flat ground, has less than half of the score of the best law, which reads the scan."""
+    setup = place_setup(*place)
+    scale = anchors.anchors(setup)
     assert scale.score(scale.blind) < 0.5
+    assert "scan" in law(setup.definition, preset_of(setup.body, scale.preset)).reads

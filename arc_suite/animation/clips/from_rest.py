@@ -87,7 +87,7 @@ def _play(body: Body, clip: Acted, rest: Pose) -> Draft:
     motion = clip.play(body, rest)
     if not isinstance(motion, ClipMotion):
         raise ValueError(f"expected a ClipMotion of its play, got {type(motion).__name__}")
-    return Draft(motion, loops=clip.loops, stands=not clip.steps)
+    return Draft(motion, loops=clip.loops, stands=clip.planted and not clip.steps)
 
 
 def _act(body: Body, clip: Acted, idle: Pose) -> Draft:

@@ -103,6 +103,13 @@ def test_without_a_policy_of_the_package_there_is_no_get_up():
         getting_up.get_up(ROBOTS["queen"], rest=None, lies_on="back")
 
 
+def test_feet_leave_the_ground_in_a_jump_and_come_down():
+    clip = made("tick", "jump", "idle")["jump"]
+    for foot in ROBOTS["tick"].foot_names:
+        events = [contact.event for contact in clip.foot_contacts if contact.foot == foot]
+        assert events and events == [foot_contacts.LIFT_OFF, foot_contacts.TOUCH_DOWN] * (len(events) // 2)
+
+
 def test_the_bytes_of_a_walk_hold_its_kinematics():
     clips = export.clips(Setup.of("tick", "steer"), ["walk"], fps=30)
     assert_kinematics(ROBOTS["tick"], gltf_reader.read(export.glb(ROBOTS["tick"], clips)), clips)
