@@ -1,5 +1,6 @@
-"""How a body gets up from a fall: by a policy of the package, then in steps to the pose at rest."""
+"""How a body gets up from a fall: by a policy of the package or by `rising`, then in steps to the pose at rest."""
 
+import itertools
 import math
 from collections.abc import Iterator
 
@@ -15,7 +16,8 @@ from arc_suite.robots.spec import Body
 
 _TASK = "recover"
 _SECONDS = 4.0  # of getting up, and of standing after it
-_FALLS = 20  # that are tried, of the judges' table
+_FALLS = 20  # on a side, the back or the belly, that are tried
+_SEEDS = 200  # of episodes, among whose first poses they are looked for
 # By what a body lies on: the least and the largest cosine of the tilt of its torso.
 _TILTS = {"belly": (0.7, 1.0), "side": (-0.4, 0.4), "back": (-1.0, -0.7)}
 # A torso that is slower stands.
@@ -32,9 +34,10 @@ _VERTICAL_SHARE = 0.15  # of a swing at either end, in which a foot moves up or 
 
 
 def get_up(body: Body, rest: Pose, lies_on: str) -> ClipMotion:
-    """Return how a body gets up from a fall, by the policy of the package for the task recover, to the pose at rest.
+    """Return how a body gets up from a fall to the pose at rest, by the task recover.
 
-    It is the first fall of a table in which feet that stand hardly slide. The root stays between the feet.
+    It acts by the policy of the package, or, without one, by the demonstrator `rising`. The fall is the first in which
+    feet that stand hardly slide. The root stays between the feet.
 
     Args:
         body: the spec.
@@ -42,10 +45,8 @@ def get_up(body: Body, rest: Pose, lies_on: str) -> ClipMotion:
         lies_on: belly, side or back.
 
     Raises:
-        ValueError: the package has no such policy, the body does not get up, or feet slide in all falls.
+        ValueError: the body does not get up, or feet slide in all falls.
     """
-    if not policies.is_packaged(body, _TASK):
-        raise ValueError(f"the package has no policy of {_TASK} for it")
     slides = []
     for recording in _record_falls(body, lies_on):
         motion = _stay_between_feet(body, rest, recording)
@@ -65,17 +66,29 @@ def _record_falls(body: Body, lies_on: str) -> Iterator[Recording]:
     Legs that hang in the air may creep for seconds after that. They step to their places next.
     """
     setup = Setup.of(body, _TASK)
-    policy = policies.policy("ppo", body, task=setup.definition)
-    least, largest = _TILTS[lies_on]
-    for seed in range(_FALLS):
+    if policies.is_packaged(body, _TASK):
+        policy = policies.policy("ppo", body, task=setup.definition)
+    else:
+        policy = policies.policy("cpg", body, "rising", task=setup.definition)
+    for seed in itertools.islice(_find_falls(setup, lies_on), _FALLS):
         environment = setup.load(seed)
         recording = record(environment, policy, settle=0, steps=round(_SECONDS / environment.control_timestep()))
         has_got_up = environment.task.progress["up"]
         environment.close()
         samples = _samples_to_stand(body, recording)
-        stands = has_got_up and samples < len(recording.poses) - 1
-        if stands and least <= rotations.upright(recording.poses[0, 3:7]) <= largest:
+        if has_got_up and samples < len(recording.poses) - 1:
             yield stop_at(recording, samples)
+
+
+def _find_falls(setup: Setup, lies_on: str) -> Iterator[int]:
+    """Yield the seeds of episodes in which a body lies on its belly, side or back at the start."""
+    least, largest = _TILTS[lies_on]
+    for seed in range(_SEEDS):
+        environment = setup.load(seed)
+        environment.reset()
+        if least <= rotations.upright(environment.physics.data.qpos[3:7]) <= largest:
+            yield seed
+        environment.close()
 
 
 def _samples_to_stand(body: Body, recording: Recording) -> int:
