@@ -25,7 +25,7 @@ from arc_suite.tasks import TASKS
 ROOT = pathlib.Path(__file__).parents[3]
 COMMITTED = ROOT / "studies"
 # The presets that collect on the division of demonstrations.
-PRESETS = {"walk": "medium", "steer": "reactive", "rough": "surefooted", "stairs": "surefooted", "navigate": "planned"}
+PRESETS = {"walk": "medium", "steer": "reactive", "rough": "surefooted", "gaps": "sighted", "navigate": "planned"}
 
 
 def test_there_are_ten_places():
@@ -48,7 +48,7 @@ def test_a_track_is_a_study(name, steps, far, prior):
         setup = each.configuration.setup
         task = setup.kind.name
         assert each.configuration.steps == (far if task in FAR else steps)
-        assert setup == place_setup(setup.name, task) and bool(setup.task_kwargs) == (task in ("rough", "stairs"))
+        assert setup == place_setup(setup.name, task) and bool(setup.task_kwargs) == (task in ("rough", "gaps"))
         if prior is None:
             assert each.prior is None
         else:
