@@ -1,23 +1,13 @@
 """Types of a simulation's data and model, for editors and type checkers: MuJoCo's and dm_control's own have none."""
 
 from contextlib import AbstractContextManager
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import mujoco
 import numpy as np
 
-if TYPE_CHECKING:
-    from arc_suite.simulation.mujoco_types import FurtherDataFields, FurtherModelFields
-else:  # programs do not need the names of all fields
 
-    class FurtherDataFields(Protocol):
-        """See `mujoco_types`."""
-
-    class FurtherModelFields(Protocol):
-        """See `mujoco_types`."""
-
-
-class MjData(FurtherDataFields, Protocol):
+class MjData(Protocol):
     """The state of a simulation and what follows from it, for functions of `mujoco`; arrays are live.
 
     These are the fields that programs read most; the others are there, too.
@@ -66,6 +56,8 @@ class MjData(FurtherDataFields, Protocol):
     mocap_quat: np.ndarray
     sensordata: np.ndarray
 
+    def __getattr__(self, name: str) -> Any: ...
+
 
 class Data(MjData, Protocol):
     """The data of a simulation as dm_control wraps them, `physics.data`.
@@ -83,7 +75,7 @@ class Data(MjData, Protocol):
     def copy(self) -> "Data": ...
 
 
-class MjModel(FurtherModelFields, Protocol):
+class MjModel(Protocol):
     """The model of a simulation, for functions of `mujoco`; arrays are live.
 
     These are the fields that programs read most; the others are there, too.
@@ -131,6 +123,8 @@ class MjModel(FurtherModelFields, Protocol):
     pair_friction: np.ndarray
     key_qpos: np.ndarray
     qpos0: np.ndarray
+
+    def __getattr__(self, name: str) -> Any: ...
 
 
 class Model(MjModel, Protocol):
