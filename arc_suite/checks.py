@@ -230,7 +230,6 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "workers": ("threads", "jobs"),
     "world": ("arena",),
     "xml": ("spec", "robot"),
-    "yaml": ("config",),
 }
 _GAP_BETWEEN_NAMES = re.compile(r"[\s;+|]+")  # in place of commas
 _VERSION = re.compile(r"-v\d{1,3}$")  # of Gymnasium's names
@@ -240,7 +239,7 @@ _MIN_NAMED_BOUND = 1e-6
 _MAX_DIGITS = 20  # of an integer in a text
 _MAX_QUOTE = 300  # characters
 _SAME_WORD = 0.9  # similarity, up to 1, of two spellings of one word
-_SIMILAR_WORD = 0.7  # the same of a word with mistakes
+_SIMILAR_WORD = 0.66  # the same of a word with mistakes
 _MAX_PATH = 80  # characters of a path `module:name` in an error
 _COUNT = re.compile(r"(\d{1,20}(?:\.\d{0,20})?(?:e\d\d?)?)([km]?)", re.IGNORECASE)  # such as 1e5, 100k
 _GROUPS_OF_DIGITS = re.compile(r"\d{1,3}(?:[,_' ]\d{3}){1,6}")  # such as 100,000

@@ -127,6 +127,7 @@ def test_only_the_program_that_runs_is_imported():
         f"arc_suite.cli.{name}"
         for name in (
             "doctor",
+            "flag_cures",
             "flag_mistakes",
             "help_text",
             "interrupts",

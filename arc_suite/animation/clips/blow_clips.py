@@ -25,7 +25,7 @@ _MAX_RETURN_DURATION = 2.5  # sqrt(h / g), of this way
 _SINK_BY_TILT = 0.5  # standing heights a rad: how far knees give under a torso that tilts over feet that stay
 
 
-def take_blow(recorder: Recorder, clip: BlowClip, idle: Pose) -> Draft:
+def record_blow(recorder: Recorder, clip: BlowClip, idle: Pose) -> Draft:
     """Return how a body takes the blow that suits it, from idle to idle.
 
     Of the lowest blows that tilt the torso enough, it is the strongest; if none does, that which tilts it most.

@@ -9,7 +9,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.animation.clips import on_ground, root_motion, turning
-from arc_suite.animation.clips.blow_clips import take_blow
+from arc_suite.animation.clips.blow_clips import record_blow
 from arc_suite.animation.clips.catalog import BOTH_ENDS, Acted, BlowClip, Kind, Passage, Turn, clip_of
 from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.passages import make_passage
@@ -54,7 +54,7 @@ def make_clips_from_rest(
                 play = functools.partial(turning.turn, angle=math.radians(clip.angle))
                 return _act(body, Acted(play, BOTH_ENDS, steps=True), idle.start)
             case BlowClip():
-                return take_blow(recorder, clip, idle.start)
+                return record_blow(recorder, clip, idle.start)
             case Passage():
                 return make_passage(body, clip, transition, idle.start, walk, planted_walk)
             case _:

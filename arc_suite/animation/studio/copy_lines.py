@@ -10,12 +10,12 @@ from arc_suite.animation.studio.sketch import (
     LEGS,
     RANDOM,
     Sketch,
-    changes_of_looks,
     chosen_preset,
     make_body,
     make_settings,
     shape_changes,
     source_body,
+    visual_changes,
 )
 from arc_suite.bodies import generator
 from arc_suite.robots import ROBOTS
@@ -72,7 +72,7 @@ def _body_code(sketch: Sketch) -> tuple[str, dict[str, list[str]]]:
         arguments = ", ".join(f"{name}={value!r}" for name, value in changes.items())
         bodies_names.append("shaping")
         code = f"shaping.shaped({code}, {arguments})"
-    looks = changes_of_looks(sketch, original_body)
+    looks = visual_changes(sketch, original_body)
     if looks:
         code = f"{code}.replace({', '.join(f'{name}={value!r}' for name, value in looks.items())})"
     return code, {"arc_suite": ["policies"], "arc_suite.bodies": bodies_names, "arc_suite.robots": robots_names}

@@ -117,10 +117,10 @@ def make_body(sketch: Sketch) -> Body:
     """
     original_body = source_body(sketch)
     shaped_body = shaped(original_body, **shape_changes(sketch, original_body))
-    return shaped_body.replace(**changes_of_looks(sketch, original_body))
+    return shaped_body.replace(**visual_changes(sketch, original_body))
 
 
-def changes_of_looks(sketch: Sketch, original_body: Body) -> dict[str, Any]:
+def visual_changes(sketch: Sketch, original_body: Body) -> dict[str, Any]:
     """Return the fields of a body about its looks that a sketch sets."""
     changes: dict[str, Any] = {}
     if sketch.palette != DEFAULT_CHOICE:

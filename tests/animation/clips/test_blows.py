@@ -153,20 +153,20 @@ def test_the_strongest_blow_counts_that_suits_the_body(monkeypatch):
     clip = CLIPS["stagger_left"]
     for limit, drawn, size in ((0.5, 9.0, 0.487), (9.0, 9.0, 3.0991), (9.0, 0.5, 0.487), (0.5, 0.1, 0.0906)):
         fake_blows(monkeypatch, limit, max_drawn_size=drawn)
-        taken = blow_clips.take_blow(RECORDER, clip, REST)
+        taken = blow_clips.record_blow(RECORDER, clip, REST)
         assert taken.motion.joints[0, 0] == pytest.approx(size, abs=1e-3)
     fake_blows(monkeypatch, 0.0)
     with refused("under a blow of 0.077 sqrt(g h), its torso tilts by 40 degrees, more than 30"):
-        blow_clips.take_blow(RECORDER, clip, REST)
+        blow_clips.record_blow(RECORDER, clip, REST)
     fake_blows(monkeypatch, 0.5, max_drawn_size=0.0)
     with refused("under a blow of 0.077 sqrt(g h), the legs leave the torso no room to sway"):
-        blow_clips.take_blow(RECORDER, clip, REST)
+        blow_clips.record_blow(RECORDER, clip, REST)
 
 
 @pytest.mark.parametrize(("tilt_per_lever", "tilt"), [(11.0, 5.5), (3.0, 6.0), (1.3, 5.2), (0.2, 0.8)])
 def test_a_light_blow_comes_higher_until_the_torso_tilts_by_5_degrees(monkeypatch, tilt_per_lever, tilt):
     fake_blows(monkeypatch, 9.0, tilt_per_lever)
-    draft = blow_clips.take_blow(RECORDER, CLIPS["hit_front"], REST)
+    draft = blow_clips.record_blow(RECORDER, CLIPS["hit_front"], REST)
     assert blow_clips._measure_tilt(draft.motion.quaternions) == pytest.approx(tilt)
 
 
