@@ -1,7 +1,8 @@
 // Goals to reach one after another in rounds, and the time that it takes; browsers keep the best one.
 import * as THREE from "three";
 
-const PLACES = [[7, 2], [11, -4], [6, -9], [-1, -6], [0, 0]]; // standing heights from the start
+const PLACES = [[7, 2], [11, -4], [6, -9], [-1, -6], [0, 0]]; // standing heights from the start, in the first round
+const TURN = 1.2; // rad, by which places lie off those of two rounds before; each second round is a mirror image
 const COLOR = "#ffd23f";
 const REST = 3; // s between two rounds
 
@@ -31,9 +32,12 @@ export class Goals {
     return this.number !== null && this.number < PLACES.length;
   }
 
-  // [x, y] of the next goal, m
+  // [x, y] of the next goal, m; ways are equally long in all rounds.
   get place() {
-    return PLACES[this.number].map((value) => value * this.height);
+    const [x, y] = PLACES[this.number].map((value) => value * this.height), before = this.round - 1;
+    const side = before % 2 ? -1 : 1, angle = side * TURN * Math.floor(before / 2);
+    const cosine = Math.cos(angle), sine = Math.sin(angle);
+    return [cosine * x - sine * side * y, sine * x + cosine * side * y];
   }
 
   // Takes seconds of a body on its feet that has come to [x, y].

@@ -1,13 +1,8 @@
 // A body's task and policy, on its share of the data of a model with several like bodies.
-import { bounded } from "./command.js";
 import { Graph } from "./graph.js";
 import { Law } from "./law.js";
-import { clamp, wrapped } from "./legs.js";
 import { Recovery } from "./recovery.js";
 import { Task } from "./task.js";
-
-const SPEED = 0.9, TURNING = 1.5; // of a body that pushes: forward, and turning for each rad that it is off
-const AHEAD = 0.6; // rad, within which it walks ahead
 
 const POLICIES = { law: Law, graph: Graph };
 
@@ -45,12 +40,6 @@ export class Mind {
     this.recovery?.after(lies(), this.task.height(data.qpos), this.task.upright(data.qpos));
     if (rose && !this.rises) this.driver.begin?.();
   }
-}
-
-// The command of a body at a place [x, y, heading] that pushes another one.
-export function pushing([x, y, heading], [otherX, otherY]) {
-  const angle = wrapped(Math.atan2(otherY - y, otherX - x) - heading);
-  return bounded([Math.abs(angle) < AHEAD ? SPEED : 0, 0, clamp(TURNING * angle, -1, 1)]);
 }
 
 // The share of one of several like bodies by number: without the world, which is the first of MuJoCo's bodies.

@@ -12,3 +12,9 @@ export function paceUnder(paces, [forward, left, turn]) {
   const [tempo, change, height] = [1, 2, 3].map((i) => paces[next - 1][i] + share * (paces[next][i] - paces[next - 1][i]));
   return { tempo, change, height };
 }
+
+// The gait of a body under a command, by its name and a multiple of its frequency; it takes the choices of a page's data.
+export function pacedGait({ gaits, frequency, paces }, command, name = "own", quickness = 1) {
+  const { tempo, change } = paceUnder(paces, command), [...offsets] = gaits[name], duty = offsets.pop();
+  return [...offsets, duty + change, frequency * quickness * tempo];
+}

@@ -1,6 +1,6 @@
 // Sliders of a pose and a choice of gait, for bodies that take them by command.
 import { clamp } from "./legs.js";
-import { paceUnder } from "./pace.js";
+import { pacedGait } from "./pace.js";
 
 const STEP = 0.01; // of a slider, standing heights or rad
 
@@ -52,7 +52,7 @@ export class Panel {
   // suits the speed; a run, which not all bodies have, is faster ahead.
   asked(command, shares, runs = false) {
     if (!this.direction) return { command };
-    const { room, gaits, frequency, paces, run } = this.direction;
+    const { room, run } = this.direction;
     const sought = room.map(([low, high], i) => {
       const held = shares[i] * (shares[i] < 0 ? -low : high);
       return clamp(Number(this.sliders[i].input.value) + held, low, high);
@@ -62,8 +62,7 @@ export class Panel {
     const pose = sought.map((value) => value / Math.max(used, 1));
     const [forward, ...others] = command;
     const going = [runs && run && forward > 0 ? run * forward : forward, ...others];
-    const { tempo, change } = paceUnder(paces, going), [...offsets] = gaits[this.list.value], duty = offsets.pop();
-    const gait = [...offsets, duty + change, frequency * this.tempo.value * tempo];
+    const gait = pacedGait(this.direction, going, this.list.value, this.tempo.value);
     return { command: going, pose, gait };
   }
 

@@ -82,7 +82,7 @@ class Play {
   }
 
   restart() {
-    if (this.ring) this.ring.score = [0, 0];
+    this.ring?.begin();
     this.place();
     if (this.goals.number !== null) this.goals.begin();
   }
@@ -90,9 +90,10 @@ class Play {
   // Puts all bodies where they started.
   place() {
     this.simulation.release();
-    this.simulation.restart();
+    this.simulation.restart(undefined, undefined, this.ring?.turns);
     this.lain = this.down = this.debt = 0;
     this.chase.on = true;
+    this.chase.follow(this.heading);
     this.steps.begin();
     this.traces.clear();
   }
@@ -112,7 +113,7 @@ class Play {
     if (seconds > 0) this.pace += share * (Math.min(stepped / seconds, 1) - this.pace);
     if (!simulation.pull) {
       this.goals.advance(stepped, simulation.task.place);
-      if (this.ring?.advance(simulation.minds.map(({ task }) => task.place))) this.place();
+      if (this.ring?.advance(stepped, simulation.minds.map(({ task }) => task.place))) this.place();
     }
     this.lain = simulation.fell ? this.lain + stepped : 0;
     this.down = simulation.minds[1]?.fell ? this.down + stepped : 0;
@@ -124,7 +125,7 @@ class Play {
   // Starts anew as a body cannot get up, by number; in a ring the other one scores.
   lose(number) {
     if (!this.ring) return this.restart();
-    this.ring.score[1 - number] += 1;
+    this.ring.win(1 - number);
     this.place();
   }
 

@@ -1,5 +1,7 @@
 // A body on some ground in MuJoCo's simulation, driven by a policy in a task; another one may stand before it.
-import { Mind, doubled, pushing, shareOf } from "./mind.js";
+import { Mind, doubled, shareOf } from "./mind.js";
+import { Rival } from "./rival.js";
+import { turned } from "./task.js";
 
 const STIFFNESS = 4, STRONGEST = 3; // of a pull, in the body's weight for a distance of h, and at most
 const GRAVITY = 9.81; // m/s^2
@@ -56,24 +58,27 @@ export class Simulation {
     this.restart();
   }
 
-  // Starts anew, from a pose and velocities that may be given.
-  restart(qpos = this.start, qvel = []) {
+  // Starts anew, from a pose and velocities that may be given; bodies are turned by angles, rad.
+  restart(qpos = this.start, qvel = [], turns = [0, Math.PI]) {
     const { mujoco, model, data } = this;
     mujoco.mj_resetData(model, data);
-    this.shares.forEach((share, number) => this.put(share(), [number * APART * this.body.reach, 0], qpos));
+    this.shares.forEach((share, number) => this.put(share(), qpos, number * APART * this.body.reach, turns[number]));
     data.qvel.set(qvel);
     mujoco.mj_forward(model, data);
     this.minds = this.shares.map((share) => this.mind(share));
+    for (const { task } of this.minds) task.alone = this.minds.length === 1;
+    this.rival = new Rival(this.body, this.center);
     this.count = 0; // substeps
     this.landing = 0; // s that are left; endless until a body that was let go touches the ground
   }
 
-  // Puts a body in a pose of the start, moved by [x, y].
-  put({ qpos }, [x, y], pose = this.start) {
+  // Puts a body in a pose, turned by an angle, rad, and moved along x, m.
+  put({ qpos }, pose, along, angle) {
     qpos.set(pose);
-    qpos[0] += x;
-    qpos[1] += y;
-    if (x || y) qpos[2] += this.ground(qpos[0], qpos[1]);
+    if (angle) qpos.set(turned(pose.slice(3, 7), angle), 3);
+    if (!along) return;
+    qpos[0] += along;
+    qpos[2] += this.ground(qpos[0], qpos[1]);
   }
 
   mind(share) {
@@ -100,7 +105,7 @@ export class Simulation {
     const { mujoco, model, data, task, minds: [own, rival], body: { substeps } } = this;
     if (this.count % substeps === 0) {
       own.act(() => this.allowed(asked));
-      rival?.act(() => ({ ...asked, ...STILL, command: pushing(rival.task.place, own.task.place) }));
+      rival?.act(() => this.rival.asked(rival.task.place, own.task.place));
     }
     if (this.pull) this.drag(this.pull);
     mujoco.mj_step(model, data);
@@ -108,8 +113,14 @@ export class Simulation {
     if (this.count % substeps !== 0) return;
     own.after(() => this.fell);
     rival?.after(() => rival.task.fell);
+    if (rival && !rival.fell) this.lunge(rival.task);
     if (this.landing === Infinity && this.touches()) this.landing = LANDING;
     this.landing = Math.max(this.landing - task.constants.step, 0);
+  }
+
+  lunge({ constants: { step }, place, motion }) {
+    const velocity = this.rival.lunge(step, place, this.task.place, motion);
+    if (velocity) this.kick(velocity, 1);
   }
 
   // The commands that a body can follow: it leaps upright, and lands on bent legs.
@@ -174,9 +185,9 @@ export class Simulation {
     this.data.xfrc_applied.fill(0);
   }
 
-  // Adds a velocity [x, y] to the torso's, m/s.
-  kick([x, y]) {
-    const qvel = this.data.qvel;
+  // Adds a velocity [x, y], m/s, to that of a torso by number.
+  kick([x, y], number = 0) {
+    const { qvel } = this.shares[number]();
     qvel[0] += x;
     qvel[1] += y;
   }

@@ -10,7 +10,7 @@ function yaw([w, x, y, z]) {
 }
 
 // An orientation turned by an angle about the vertical, rad.
-function turned([w, x, y, z], angle) {
+export function turned([w, x, y, z], angle) {
   const cosine = Math.cos(0.5 * angle), sine = Math.sin(0.5 * angle);
   return [cosine * w - sine * z, cosine * x - sine * y, cosine * y + sine * x, cosine * z + sine * w];
 }
@@ -48,6 +48,7 @@ export class Task {
     this.phase = 0; // of the gait, rad
     this.direction = constants.direction ? new Direction(constants.direction) : null;
     this.fell = false;
+    this.alone = true; // whether nothing but the ground touches it
   }
 
   begin(data) {
@@ -103,7 +104,8 @@ export class Task {
   fallen({ qpos, cfrc_ext: forces }) {
     const { lowest, lying, least_upright: least, weight, parts: [torso] } = this.constants;
     const high = this.height(qpos) >= lowest * (this.direction?.crouch ?? 1);
-    return !(high && forces[6 * torso + 5] / weight < lying && this.upright(qpos) >= least);
+    const lies = this.alone && forces[6 * torso + 5] / weight >= lying; // others press on it, too
+    return !high || lies || this.upright(qpos) < least;
   }
 
   // The cosine of the torso's tilt.

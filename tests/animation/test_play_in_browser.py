@@ -490,6 +490,20 @@ def test_steps_leave_prints_and_dust_and_are_heard(tab):
     assert tab.evaluate("play.state.play.traces.prints.count") == 0
 
 
+def lengths(places):
+    """How far each place is from the next, m."""
+    return [math.dist(first, second) for first, second in itertools.pairwise(places)]
+
+
+def places_of_round(tab, number):
+    """The places of the goals of a round, m."""
+    return tab.evaluate(
+        """(round) => { const { goals } = play.state.play; goals.begin(round);
+        return [0, 1, 2, 3, 4].map((number) => ((goals.number = number), goals.place)); }""",
+        number,
+    )
+
+
 def test_goals_are_reached_in_a_time(tab):
     goal = "play.state.play.goals"
     tab.select_option("#mode", "goals")
@@ -499,11 +513,15 @@ def test_goals_are_reached_in_a_time(tab):
         places.append(tab.evaluate(f"{goal}.place"))
         tab.evaluate("place => play.state.play.simulation.data.qpos.set(place)", places[-1])
         advanced(tab, 0.1)
-    away = [math.dist(first, second) for first, second in itertools.pairwise(places)]
-    assert len(places) == 6 and min(away) > 4.0 * ROBOTS["tick"].torso.standing_height
+    assert len(places) == 6 and min(lengths(places)) > 4.0 * ROBOTS["tick"].torso.standing_height
     assert tab.evaluate(f"String({goal})") == "round 1, 5 goals in 0.5 s, best 0.5 s"
     advanced(tab, 3.1)
     assert tab.evaluate(f"String({goal})").startswith("round 2, goal 1 of 5, ")
+    rounds = [places, *([[0, 0], *places_of_round(tab, number)] for number in (2, 3, 4, 5))]
+    for second in rounds[1:]:
+        assert lengths(second) == pytest.approx(lengths(places))
+    assert min(math.dist(*firsts) for firsts in itertools.combinations([way[1] for way in rounds], 2)) > 0.5
+    assert tab.evaluate(f"{goal}.begin(2), String({goal})").startswith("round 2, goal 1 of 5, 0.0 s")
     tab.keyboard.press("r")
     assert tab.evaluate(f"String({goal})") == "round 1, goal 1 of 5, 0.0 s, best 0.5 s"
     tab.select_option("#mode", "free")
@@ -525,29 +543,70 @@ def test_a_rival_comes_and_pushes(tab):
     reach = tab.evaluate("play.state.play.body.reach")
     advanced(tab, 0.1)
     assert other(tab)[0] > 2.0 * reach
-    advanced(tab, 12.0)
+    advanced(tab, 3.0)
     x, y, _, fell = other(tab)
     (mine_x, mine_y, *_), _ = advanced(tab, 0.05)
     assert math.hypot(x - mine_x, y - mine_y) < 2.2 * reach and not fell
     assert math.hypot(mine_x, mine_y) > 0.05  # it is pushed
 
 
+def rounds_won(tab, key, rounds, seconds):
+    """The numbers of the winners of rounds, and where the player's body was a second before it lost or won.
+
+    Args:
+        tab: the page.
+        key: key that is held, or None.
+        rounds: number of rounds.
+        seconds: time in which a round is over.
+    """
+    if key:
+        tab.keyboard.down(key)
+    found = tab.evaluate(
+        """([rounds, seconds]) => { const { play: now } = play.state, winners = [], places = [];
+        for (let before = [0, 0], time = 0; winners.length < rounds; time += 0.5) {
+          if (time > seconds) throw new Error(`no winner within ${seconds} s`);
+          const { place } = now.simulation.task;
+          now.advance(0.5, play.panel.asked(play.inputs.command, play.inputs.pose, play.inputs.runs), Infinity);
+          const winner = now.ring.score.findIndex((points, number) => points > before[number]);
+          if (winner < 0) continue;
+          winners.push(winner); places.push([...place]); before = [...now.ring.score]; time = -0.5;
+        } return [winners, places]; }""",
+        [rounds, seconds],
+    )
+    if key:
+        tab.keyboard.up(key)
+    return found
+
+
+@pytest.mark.parametrize("body", ["0", "3"], ids=["tick", "queen"])
+def test_a_rival_beats_who_does_nothing_or_only_walks_ahead(tab, body):
+    """Someone idle loses a point within 40 s; who holds one key does not win all rounds, and rounds differ."""
+    tab.select_option("#body", body)
+    tab.select_option("#mode", "rival")
+    assert rounds_won(tab, None, 1, 40.0)[0] == [1]
+    tab.keyboard.press("r")
+    winners, places = rounds_won(tab, "w", 3, 40.0)
+    assert 1 in winners
+    reach = tab.evaluate("play.state.play.body.reach")
+    assert min(math.dist(first[:2], second[:2]) for first, second in itertools.combinations(places, 2)) > 0.2 * reach
+
+
 def test_who_leaves_the_ring_loses_a_point(tab):
     tab.select_option("#mode", "rival")
     score, simulation = "String(play.state.play.ring)", "play.state.play.simulation"
     advanced(tab, 0.2)
-    assert tab.evaluate(score) == "you 0, rival 0"
+    assert tab.evaluate(score) == "you 0, rival 0, 30 s"
     tab.evaluate(f"{simulation}.shares[1]().qpos[1] += 50")
     advanced(tab, 0.2)
-    assert tab.evaluate(score) == "you 1, rival 0"
+    assert tab.evaluate(score).startswith("you win the round: you 1, rival 0, ")
     assert abs(other(tab)[1]) < 0.1  # both start again
     tab.evaluate(f"{simulation}.shares[0]().qpos[1] += 50")
     advanced(tab, 0.2)
-    assert tab.evaluate(score) == "you 1, rival 1"
+    assert tab.evaluate(score).startswith("the rival wins the round: you 1, rival 1, ")
     tab.evaluate("play.state.stale = true")
-    tab.wait_for_function("document.getElementById('state').textContent.startsWith('you 1, rival 1')")
+    tab.wait_for_function("document.getElementById('state').textContent.includes('you 1, rival 1')")
     tab.keyboard.press("r")
-    assert tab.evaluate(score) == "you 0, rival 0"
+    assert tab.evaluate(score) == "you 0, rival 0, 30 s"
 
 
 def test_a_rival_that_lies_gets_up(tab):
@@ -586,6 +645,9 @@ def test_everything_has_its_place(browser, page, width, height):
     for (name, first), (other, second) in itertools.combinations(found.items(), 2):
         apart = first[2] <= second[0] or second[2] <= first[0] or first[3] <= second[1] or second[3] <= first[1]
         assert apart, (name, other)
+    if height > 500:  # where there is room, the state is a line or two
+        left, top, right, bottom = found["state"]
+        assert bottom - top < 60 and (right - left > 0.8 * width or not touch)
     covered = sum((right - left) * (bottom - top) for left, top, right, bottom in found.values())
     assert covered < 0.6 * width * height
     tab.evaluate("document.getElementById('direction').open = true")

@@ -31,7 +31,8 @@ class Downloads:
         self._saved_states: dict[str, PageState] = {}  # by name of their button, the latest last
         self._saved_count = 0
         gui.add_button("Save Design", hint="Body, task and command").on_click(self._save_design)
-        self._weight = layout.add_weight(gui)
+        self._weight, self._character = layout.add_weight(gui)
+        self._character.on_update(in_order(self._choose_character))
         for file in saving.FILES:
             gui.add_button(f"Save {file.label}").on_click(functools.partial(self._save, file))
         self._gallery_folder = gui.add_folder("Saved in this session", visible=False)
@@ -43,6 +44,16 @@ class Downloads:
     def show_lines(self, sketch: Sketch) -> None:
         """Show the lines of Python and the command that make the creature of a sketch."""
         self._lines.content = texts.lines_to_copy(sketch)
+
+    def _choose_character(self, event: viser.GuiEvent) -> None:
+        """Disable the slider of the weight where a character replaces it."""
+        self._weight.disabled = event.target.value != layout.USUAL_CHARACTER
+
+    def _weight_of_clips(self) -> float | str:
+        """Return the name of a character, or a multiple of the usual weight; see `swaying.choose_character`."""
+        if self._character.value == layout.USUAL_CHARACTER:
+            return self._weight.value
+        return self._character.value
 
     def _save_design(self, event: viser.GuiEvent) -> None:
         """Send the state of the page to the visitor who asks for it."""
@@ -62,7 +73,7 @@ class Downloads:
         notification = client.add_notification(f"Making {file_name}", "", loading=True)
         try:
             qpos = creature.environment.physics.data.qpos.copy()
-            options = {"weight": self._weight.value} if file.takes_weight else {}
+            options = {"weight": self._weight_of_clips()} if file.takes_weight else {}
             content = file.make(creature, qpos, commands, **options)
         except (ValueError, OSError, RenderingUnavailable) as error:
             if self._is_here(client):

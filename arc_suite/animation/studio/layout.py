@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import viser
 
 from arc_suite.animation import player_controls
-from arc_suite.animation.clips.swaying import MAX_WEIGHT
+from arc_suite.animation.clips.swaying import CHARACTERS, MAX_WEIGHT
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.picture_buttons import PictureButtons
 from arc_suite.animation.studio.sketch import DEFAULT_CHOICE, Sketch
@@ -28,6 +28,7 @@ LENGTH_FACTORS = (0.5, 2.0)  # lowest and highest factor of a length
 LENGTH_FACTOR_STEP = 0.05
 _MAX_KICKS = 3.0  # sqrt(g h)
 MAX_SEED = 2**32 - 1
+USUAL_CHARACTER = "usual"  # stands for the slider of the weight
 
 
 class _Slider(NamedTuple):
@@ -150,11 +151,15 @@ def add_length_factor(gui: viser.GuiApi) -> viser.GuiSliderHandle:
     return gui.add_slider("", min=lowest, max=highest, step=LENGTH_FACTOR_STEP, initial_value=1.0, visible=False)
 
 
-def add_weight(gui: viser.GuiApi) -> viser.GuiSliderHandle:
-    """Add a slider of the weight of clips that are saved, as a multiple of the usual one."""
-    return gui.add_slider(
+def add_weight(gui: viser.GuiApi) -> tuple[viser.GuiSliderHandle, viser.GuiDropdownHandle[str]]:
+    """Add a slider of the weight of clips that are saved, and a list of characters, which replace it."""
+    slider = gui.add_slider(
         "Weight of clips", min=0.0, max=MAX_WEIGHT, step=0.1, initial_value=1.0, hint="Multiple of the usual one"
     )
+    characters = gui.add_dropdown(
+        "Character", (USUAL_CHARACTER, *CHARACTERS), hint="How the body carries its weight; usual: by the slider"
+    )
+    return slider, characters
 
 
 def list_with(choice: str, names: Iterable[str]) -> list[str]:

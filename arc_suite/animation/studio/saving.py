@@ -60,8 +60,8 @@ def make_mjcf(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes
     return models.text(creature.setup.body, arena).encode()
 
 
-def make_clips(creature: Creature, qpos: np.ndarray, commands: Commands, weight: float = 1.0) -> bytes:
-    """Return animation clips as binary glTF, with a multiple of the usual weight; see `animation.clips`.
+def make_clips(creature: Creature, qpos: np.ndarray, commands: Commands, weight: float | str = 1.0) -> bytes:
+    """Return animation clips as binary glTF, with a weight; see `animation.clips`.
 
     Raises:
         ValueError: a clip cannot be made.

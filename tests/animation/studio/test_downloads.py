@@ -4,6 +4,7 @@ import types
 
 import pytest
 
+from arc_suite.animation.clips.swaying import CHARACTERS
 from arc_suite.animation.studio.session import Session
 from arc_suite.animation.studio.sketch import Sketch
 
@@ -50,3 +51,24 @@ def test_a_file_is_for_a_visitor_who_is_here(stays, monkeypatch):
     assert visitor.files == ([b"content"] if stays else [])
     assert visitor.notes.count("removed") == 2
     assert any(note.startswith("No ") for note in visitor.notes) == stays
+
+
+def test_clips_take_a_character_in_place_of_the_slider(monkeypatch):
+    server = viser.ViserServer(host="127.0.0.1", port=8191, verbose=False)
+    session = Session(Sketch(legs=4, links=2))
+    weights = []
+    monkeypatch.setattr(saving.clips, "clips", lambda *given, weight: weights.append(weight) or [])
+    try:
+        page_part = downloads.Downloads(server, session, Editor(session), lambda: None)
+        (file,) = (file for file in saving.FILES if file.takes_weight)
+        page_part._weight.value = 0.5
+        for name in ("usual", "heavy", "nervous", "old"):
+            page_part._character.value = name
+            page_part._choose_character(types.SimpleNamespace(target=page_part._character))
+            assert page_part._weight.disabled == (name != "usual")
+            page_part._save(file, types.SimpleNamespace(client=Visitor()))
+    finally:
+        session.close()
+        server.stop()
+    assert page_part._character.options == ("usual", *CHARACTERS)
+    assert weights == [0.5, *CHARACTERS]
