@@ -1,6 +1,7 @@
 """Clips in pictures: frames of a loop in place, on a turntable, sheets of sprites in several directions."""
 
 import math
+import warnings
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -21,6 +22,7 @@ _FREE_CAMERA = -1  # MuJoCo's number of the camera without a name
 _AZIMUTH = 90.0  # degrees: a body with heading 0 goes to the right in the picture
 _ELEVATION = -20.0  # degrees: the camera looks down
 _MARGIN = 1.03  # times the distance at which the body fills the picture
+_WIDE = 1.25  # times the median distance of the clips of a sheet: a clip that needs more makes all others small
 _EXTENTS_TO_CAMERA = 1.5  # distance of MuJoCo's free camera, in extents of the scene
 _PLAIN_GROUND = (0.36, 0.40, 0.45, 1.0)  # RGBA; a grid would stand still under a body that walks in place
 _NO_GROUND = (0.0, 0.0, 0.0, 0.0)
@@ -61,11 +63,13 @@ class _Stage(NamedTuple):
         drawing: with the free camera on all of the body.
         ground_line: where the ground below the torso is in a picture, as a share of its height from the top.
         view_height: height that a picture shows at the vertical axis of the body, m.
+        distances: least distance of the camera, m, at which each clip is in view.
     """
 
     drawing: pictures.Decorated
     ground_line: float
     view_height: float
+    distances: Sequence[float]
 
 
 def film_pictures(
@@ -91,7 +95,7 @@ def film_pictures(
     turn = 2.0 * np.pi if turntable else 0.0
     headings = np.linspace(0.0, turn, picture_count, endpoint=False)
     poses = _list_poses(body, clip, frames, headings)
-    stage = opengl.call(lambda: _prepare_stage(body, poses[: count_frames(clip)], transparent))
+    stage = opengl.call(lambda: _prepare_stage(body, [poses[: count_frames(clip)]], transparent))
     yield from _render(stage, poses, size, transparent)
 
 
@@ -107,7 +111,8 @@ def sprite_sheet(body: Body, clips: Sequence[Clip], size: int, directions: int, 
     """Return a sheet in which a clip has a row for each direction and a column for each frame.
 
     The first row goes to the right in the picture; each next one is turned further to the left. All clips have one
-    scale. Cells after the last frame of a clip are empty. Other arguments are those of `film_pictures`.
+    scale. Cells after the last frame of a clip are empty. Other arguments are those of `film_pictures`. Warns of clips
+    that move so far aside that the body is small in all cells.
 
     Args:
         body: body of the clips.
@@ -119,11 +124,12 @@ def sprite_sheet(body: Body, clips: Sequence[Clip], size: int, directions: int, 
     headings = 2.0 * np.pi * np.arange(directions) / directions
     frames_of_clips = [np.arange(count_frames(clip)) for clip in clips]
     poses = []
-    framed_poses = []
+    poses_of_clips = []
     for clip, frames in zip(clips, frames_of_clips, strict=True):
         poses += _list_poses(body, clip, np.tile(frames, directions), np.repeat(headings, len(frames)))
-        framed_poses += _list_poses(body, clip, frames, np.zeros(len(frames)))
-    stage = opengl.call(lambda: _prepare_stage(body, framed_poses, transparent))
+        poses_of_clips.append(_list_poses(body, clip, frames, np.zeros(len(frames))))
+    stage = opengl.call(lambda: _prepare_stage(body, poses_of_clips, transparent))
+    _warn_of_wide_clips(clips, stage.distances)
     squares = list(_render(stage, poses, size, transparent))
     columns = max(map(len, frames_of_clips))
     empty_square = np.broadcast_to(squares[0][-1, 0], squares[0].shape)  # of the ground, below the horizon
@@ -135,6 +141,17 @@ def sprite_sheet(body: Body, clips: Sequence[Clip], size: int, directions: int, 
             first += len(frames)
             rows.append(np.concatenate(row + [empty_square] * (columns - len(row)), axis=1))
     return Sheet(np.concatenate(rows), size, size * stage.ground_line, size / stage.view_height)
+
+
+def _warn_of_wide_clips(clips: Sequence[Clip], distances: Sequence[float]) -> None:
+    """Warn of clips that need so much more room than most that the body is small in all cells."""
+    median = np.median(distances)
+    wide_names = [clip.name for clip, distance in zip(clips, distances, strict=True) if distance > _WIDE * median]
+    if wide_names:
+        others = [distance for distance in distances if distance <= _WIDE * median]
+        gain = max(distances) / max(others)
+        line = f"need more room than the others: in a sheet without them the body is {gain:.1f} times as large"
+        warnings.warn(f"clips {', '.join(wide_names)} {line}", stacklevel=3)
 
 
 def count_frames(clip: Clip) -> int:
@@ -165,21 +182,22 @@ def _render(stage: _Stage, poses: Sequence[_Pose], size: int, transparent: bool)
         opengl.call(stage.drawing.free)
 
 
-def _prepare_stage(body: Body, poses: Sequence[_Pose], transparent: bool) -> _Stage:
-    """Return a model to draw, with the free camera on all of the body in all poses."""
+def _prepare_stage(body: Body, poses_of_clips: Sequence[Sequence[_Pose]], transparent: bool) -> _Stage:
+    """Return a model to draw, with the free camera on all of the body in all poses of clips."""
     if transparent:
         drawing = pictures.Decorated.from_body(body, quality=_TRANSPARENT_QUALITY, ground=_NO_GROUND)
     else:
         drawing = pictures.Decorated.from_body(body, quality=_OPAQUE_QUALITY, ground=_PLAIN_GROUND)
     model = drawing.model.ptr
-    radii, heights = _measure_outline(drawing, poses)
-    height = heights.max()
+    outlines = [_measure_outline(drawing, poses) for poses in poses_of_clips]
+    height = max(heights.max() for _, heights in outlines)
     camera = model.vis.global_
     camera.azimuth = _AZIMUTH
     camera.elevation = _ELEVATION
     model.stat.center[:] = 0.0, 0.0, 0.5 * height
     half_view = math.radians(0.5 * camera.fovy)
-    distance = _MARGIN * _find_distance(radii, heights - 0.5 * height, half_view)
+    distances = [_find_distance(radii, heights - 0.5 * height, half_view) for radii, heights in outlines]
+    distance = _MARGIN * max(distances)
     model.vis.map.shadowclip *= model.stat.extent * _EXTENTS_TO_CAMERA / distance
     model.stat.extent = distance / _EXTENTS_TO_CAMERA
     # The ground is half a height below the point that the camera looks at.
@@ -189,6 +207,7 @@ def _prepare_stage(body: Body, poses: Sequence[_Pose], transparent: bool) -> _St
         drawing,
         ground_line=0.5 + 0.5 * drop / (depth * math.tan(half_view)),
         view_height=2.0 * distance * math.tan(half_view),
+        distances=distances,
     )
 
 

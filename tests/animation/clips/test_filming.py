@@ -43,6 +43,16 @@ def test_a_sheet_has_a_row_for_each_direction(idle):
 
 
 @pytest.mark.slow
+def test_a_clip_that_makes_the_others_small_is_named(idle):
+    """As a death, in which the body is pushed over a standing height and a half aside."""
+    aside = idle.motion.positions + np.array([1.5 * BODY.torso.standing_height, 0.0, 0.0])
+    fall = idle._replace(name="fall", motion=idle.motion._replace(positions=aside))
+    line = r"^clips fall need more room than the others: in a sheet without them the body is 1\.\d times as large$"
+    with pytest.warns(UserWarning, match=line):
+        filming.sprite_sheet(BODY, [idle, idle, fall], SIZE, 1)
+
+
+@pytest.mark.slow
 def test_a_film_is_as_long_as_its_loop(idle):
     plain = list(filming.film_pictures(BODY, idle, SIZE))
     assert len(plain) == len(idle.times) - 1
