@@ -148,8 +148,8 @@ def _warn_of_wide_clips(clips: Sequence[Clip], distances: Sequence[float]) -> No
     median = np.median(distances)
     wide_names = [clip.name for clip, distance in zip(clips, distances, strict=True) if distance > _WIDE * median]
     if wide_names:
-        others = [distance for distance in distances if distance <= _WIDE * median]
-        gain = max(distances) / max(others)
+        usual_distance = max(distance for distance in distances if distance <= _WIDE * median)
+        gain = max(distances) / usual_distance
         line = f"need more room than the others: in a sheet without them the body is {gain:.1f} times as large"
         warnings.warn(f"clips {', '.join(wide_names)} {line}", stacklevel=3)
 
