@@ -209,7 +209,7 @@ class CommandTask(GaitTask):
             **self.settings.ground.blocks,
         }
 
-    @property
+    @functools.cached_property
     def _gait(self) -> Any:
         """The gait that feet are to follow: a `GaitAndPose` by command, or else the `PrescribedGait`."""
         gait_and_pose = self.settings.gait_and_pose

@@ -83,12 +83,11 @@ def _record_falls(body: Body, lies_on: str) -> Iterator[Recording]:
 def _find_falls(setup: Setup, lies_on: str) -> Iterator[int]:
     """Yield the seeds of episodes in which a body lies on its belly, side or back at the start."""
     least, largest = _TILTS[lies_on]
+    environment = setup.load()
     for seed in range(_SEEDS):
-        environment = setup.load(seed)
-        environment.reset()
+        environment.reset(seed)
         if least <= rotations.upright(environment.physics.data.qpos[3:7]) <= largest:
             yield seed
-        environment.close()
 
 
 def _samples_to_stand(body: Body, recording: Recording) -> int:
