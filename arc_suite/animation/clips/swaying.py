@@ -1,7 +1,8 @@
 """How a torso sways in a gait: the character of a body, and offsets of the torso by the phase of the gait.
 
 In a gait the torso sinks after touchdowns, twice a cycle, and rolls towards the feet that stand. The faster it is than
-a walk, the more it sinks, and leans ahead. It banks in turns. A damped spring delays all of this.
+a walk, the more it sinks, and leans ahead. It banks in turns. A damped spring delays all of this. In a turn on the spot
+the torso sinks after touchdowns, too.
 
 Lengths are in standing heights h, times in sqrt(h / g).
 """
@@ -14,7 +15,7 @@ import numpy as np
 from arc_suite import checks
 from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.foot_contacts import TOUCH_DOWN, find_foot_contacts, sole_heights
-from arc_suite.animation.clips.root_motion import share_of_largest
+from arc_suite.animation.clips.root_motion import fade_out, share_of_largest
 from arc_suite.animation.clips.standing_legs import HEIGHT
 from arc_suite.models import posture
 from arc_suite.models.standing import GRAVITY, time_unit
@@ -31,6 +32,8 @@ MAX_TILT = np.radians(8.0)  # rad, of the bank, and of the pitch in starts and s
 _FRONT_SHARE = 0.3  # by which the foremost feet count more than those in the middle, in the side that stands
 _MIN_COHERENCE = 0.2  # of touchdowns in half a cycle: below, that of the first foot, at phase 0, sets the phase
 _MIN_SIDE = 0.001  # of the sum of all distances of feet from the middle: below, the first foot sets the side
+
+_FADE_SHARE = 0.2  # of a turn on the spot, at either end, in which the torso does not sink as deep
 
 
 class Character(NamedTuple):
@@ -192,6 +195,21 @@ def _find_bank(loop: Draft, character: Character) -> float:
 def _direction(number: complex, least: float, default: complex) -> complex:
     """Return a complex number of size 1 in the direction of another; a default where that is small."""
     return number / abs(number) if abs(number) > least else default
+
+
+def sink_in_turn(body: Body, draft: Draft, character: Character) -> np.ndarray:
+    """Return offsets (samples, 6) of the torso in a turn on the spot, which sinks after touchdowns; 0 at both ends."""
+    _, contacts = draft.stance_height_and_contacts(body)
+    samples = len(draft.motion.joints)
+    landed_feet = np.zeros(samples)  # at each sample
+    for contact in contacts:
+        landed_feet[contact.sample] += contact.event == TOUCH_DOWN
+    depth = share_of_largest(character.follow(body, landed_feet, draft.motion.time_step))
+    shares = np.linspace(0.0, 1.0, samples)
+    away_from_ends = (1.0 - fade_out(shares / _FADE_SHARE)) * (1.0 - fade_out((1.0 - shares) / _FADE_SHARE))
+    poses = np.zeros((samples, len(posture.POSE_NAMES)))
+    poses[:, HEIGHT] = -character.amplitude * character.bob * away_from_ends * depth
+    return poses
 
 
 def loop_phases(loop: Draft) -> np.ndarray:

@@ -1,8 +1,8 @@
 """Weight: the torso of walks, starts and stops moves as on a damped spring, and feet stay where they were.
 
-The torso sways in a gait, see `swaying`, and pitches into the acceleration of starts and stops. It moves back before a
-start, a jump and a strike, and swings on after a stop, a landing and a strike; see `transients`. Legs follow by inverse
-kinematics about the feet of each sample. What they do not allow is made smaller.
+The torso sways in a gait and in turns, see `swaying`, and pitches into the acceleration of starts and stops. It moves
+back before a start, a jump and a strike, and swings on after a stop, a landing and a strike; see `transients`. Legs
+follow by inverse kinematics about the feet of each sample. What they do not allow is made smaller.
 
 Loops close and clips connect as without weight: the sway depends on the phase of the gait alone, and all other offsets
 are 0 at both ends of a clip.
@@ -18,7 +18,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.animation.clips import bounds, planting, transients
-from arc_suite.animation.clips.catalog import Acted, Kind, Passage, WalkLoop, clip_of
+from arc_suite.animation.clips.catalog import Acted, Kind, Passage, Turn, WalkLoop, clip_of
 from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.root_motion import ClipMotion, fade_out, share_of_largest
 from arc_suite.animation.clips.standing_legs import (
@@ -28,7 +28,7 @@ from arc_suite.animation.clips.standing_legs import (
     move_legs_in_stages,
     move_torso,
 )
-from arc_suite.animation.clips.swaying import MAX_TILT, Character, Sway, find_sway, loop_phases
+from arc_suite.animation.clips.swaying import MAX_TILT, Character, Sway, find_sway, loop_phases, sink_in_turn
 from arc_suite.models import posture
 from arc_suite.models.kinematics import Legs
 from arc_suite.models.standing import GRAVITY
@@ -74,7 +74,7 @@ def add_weight(body: Body, drafts: Mapping[str, Draft], character: Character) ->
         return weighted_drafts
     for name, draft in drafts.items():
         clip = clip_of(name)
-        if isinstance(clip, Acted):
+        if isinstance(clip, Acted | Turn):
             weighted_drafts[name] = _weigh_action(body, name, draft, character)
         if isinstance(clip, WalkLoop):
             passages = _plan_passages(body, drafts, character) if name == "walk" else {}
@@ -83,19 +83,27 @@ def add_weight(body: Body, drafts: Mapping[str, Draft], character: Character) ->
 
 
 def _weigh_action(body: Body, name: str, draft: Draft, character: Character) -> Draft:
-    """Return a jump or a strike, with the largest anticipation and follow-through that legs can follow."""
-    transient = transients.make_action_offsets(body, name, draft, character.frequency, character.damping)
-    if transient is None:
-        return draft
+    """Return a jump, a strike or a turn on the spot, with the largest of its offsets that legs can follow."""
     clip = clip_of(name)
+    offsets = _plan_action(body, name, clip, draft, character)
+    if offsets is None:
+        return draft
     for share in TRIED_SHARES:
-        poses = share * character.amplitude * transient
+        poses = share * offsets
         if not _can_follow(body, clip, draft, poses):
             continue
         weighted_draft = _move_torso(body, clip, draft, poses)
         if weighted_draft is not None:
             return weighted_draft._replace(weight=share)
     return draft._replace(weight=0.0)
+
+
+def _plan_action(body: Body, name: str, clip: Acted | Turn, draft: Draft, character: Character) -> np.ndarray | None:
+    """Return offsets (samples, 6) of the torso in an action, at full size; None for one without weight."""
+    if isinstance(clip, Turn):
+        return sink_in_turn(body, draft, character)
+    offsets = transients.make_action_offsets(body, name, draft, character.frequency, character.damping)
+    return None if offsets is None else character.amplitude * offsets
 
 
 # Gaits.

@@ -7,7 +7,7 @@ import pytest
 from refusals import refused
 
 from arc_suite import rotations
-from arc_suite.animation.clips import bounds, on_ground, planting, standing_legs, swaying, transients, weight
+from arc_suite.animation.clips import bounds, on_ground, planting, standing_legs, swaying, transients, turning, weight
 from arc_suite.animation.clips.catalog import clip_of
 from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.drafts import make_drafts
@@ -15,6 +15,7 @@ from arc_suite.animation.clips.recorder import Recorder
 from arc_suite.animation.clips.root_motion import Pose
 from arc_suite.envs.setup import Setup
 from arc_suite.models import posture
+from arc_suite.models.posture import find_rest_pose
 from arc_suite.robots import ROBOTS
 
 TICK = ROBOTS["tick"]
@@ -109,6 +110,21 @@ def test_the_torso_draws_back_before_an_action_and_swings_on_after_it():
         for end in (0, -1):
             for one, other in zip(drafts_of(1.0)[name].motion.pose(end), drafts_of(0.0)["idle"].start, strict=True):
                 np.testing.assert_allclose(one, other, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_a_torso_sinks_as_feet_land_in_a_turn():
+    rest = find_rest_pose(TICK)
+    position = np.array((0.0, 0.0, -rest.sole_positions[:, 2].min()))
+    stance = Pose(position, np.array((1.0, 0.0, 0.0, 0.0)), rest.legs.by_joint(rest.joint_angles))
+    draft = Draft(turning.turn(TICK, stance, 0.5 * np.pi), loops=False)
+    heavy_draft = weight.add_weight(TICK, {"turn_90": draft}, swaying.USUAL)["turn_90"]
+    depths = (draft.motion.positions - heavy_draft.motion.positions) / TICK.torso.standing_height
+    assert heavy_draft.weight == 1.0
+    assert depths[:, 2].max() == pytest.approx(swaying.USUAL.bob, rel=0.1)
+    assert not depths[:, :2].any() and not depths[[0, -1]].any()
+    soles, heavy_soles = (on_ground.measure_ground(TICK, each.motion).soles for each in (draft, heavy_draft))
+    np.testing.assert_allclose(heavy_soles, soles, atol=0.01 * TICK.torso.standing_height)
 
 
 @pytest.mark.long
