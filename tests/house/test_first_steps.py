@@ -21,6 +21,25 @@ def test_the_pages_have_what_a_road_takes(name):
             assert list(page_commands.blocks(sections(page(stem))[what])), (stem, what)
 
 
+def test_a_road_ends_with_what_it_leaves(tmp_path, monkeypatch):
+    assert check_first_steps.GOALS.keys() == check_first_steps.ROADS.keys()
+    (tmp_path / "runs" / "tick-walk-ppo-0").mkdir(parents=True)
+    policy = tmp_path / "runs/tick-walk-ppo-0/policy.npz"
+    policy.write_bytes((ROOT / "arc_suite/policies/packaged/tick-walk.npz").read_bytes())
+    (tmp_path / "tick.mp4").touch()
+    assert check_first_steps.find_unmet_goal("learner", tmp_path) == "it leaves no tick.mp4"
+    (tmp_path / "tick.mp4").write_bytes(b"a film")
+    assert check_first_steps.find_unmet_goal("learner", tmp_path) == ""
+    monkeypatch.setattr(check_first_steps, "measure_gain", lambda run: -1.5)
+    line = "runs/tick-walk-ppo-0/policy.npz earns 1.5 less than a body that stands still"
+    assert check_first_steps.find_unmet_goal("learner", tmp_path) == line
+
+
+def test_a_road_goes_after_the_one_that_it_needs():
+    assert check_first_steps.list_roads(["researcher"]) == ["learner", "researcher"]
+    assert check_first_steps.list_roads([]) == list(check_first_steps.ROADS)
+
+
 def test_the_environment_has_the_extras_of_the_front_page():
     (extras,) = re.findall(r"pip install -e '\.\[(.*)\]'", page("README"))
     assert f"check-first-steps: EXTRAS := {extras}\n" in MAKEFILE
