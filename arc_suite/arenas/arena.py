@@ -29,7 +29,7 @@ class Arena(ABC):
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
     @abstractmethod
-    def add_to(self, root: mjcf.RootElement, **contact) -> None:
+    def add_to(self, root: mjcf.RootElement, **contact: Any) -> None:
         """Add the ground to a model that holds a body.
 
         Args:

@@ -3,6 +3,7 @@
 import dataclasses
 import functools
 import math
+from typing import Any
 
 import numpy as np
 from dm_control import mjcf
@@ -33,7 +34,7 @@ class Bumps(Arena):
     unit: float
     highest: float = _MAX_HEIGHT
 
-    def add_to(self, root: mjcf.RootElement, **contact) -> None:
+    def add_to(self, root: mjcf.RootElement, **contact: Any) -> None:
         """Add the height field `floor`."""
         field.add(root, self._shares, (*self._halves, self.highest * self.unit, _THICKNESS * self.unit), **contact)
 

@@ -1,7 +1,7 @@
 """Flat: an endless level floor."""
 
 import dataclasses
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from dm_control import mjcf
 
@@ -16,7 +16,7 @@ class Flat(Arena):
 
     is_level: ClassVar[bool] = True
 
-    def add_to(self, root: mjcf.RootElement, **contact) -> None:
+    def add_to(self, root: mjcf.RootElement, **contact: Any) -> None:
         """Add the plane `floor`."""
         root.worldbody.add("geom", **PLANE, **contact)
 

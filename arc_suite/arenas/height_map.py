@@ -4,7 +4,7 @@ import base64
 import dataclasses
 import functools
 import zlib
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from dm_control import mjcf
@@ -47,7 +47,7 @@ class MapGround(Mapped):
 
     map: HeightMap
 
-    def add_to(self, root: mjcf.RootElement, **contact) -> None:
+    def add_to(self, root: mjcf.RootElement, **contact: Any) -> None:
         """Add the height field `floor`."""
         size = (0.5 * self.map.size[0], 0.5 * self.map.size[1], self._rise, _THICKNESS * self.unit)
         field.add(root, self._shares, size, pos=(0.0, 0.0, -self._start_height), **contact)

@@ -5,6 +5,7 @@ pillar is near a goal, and a body fits between any two pillars.
 """
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 from dm_control import mjcf
@@ -30,7 +31,7 @@ class Pillars(Flat):
     unit: float
     top: float
 
-    def add_to(self, root: mjcf.RootElement, **contact) -> None:
+    def add_to(self, root: mjcf.RootElement, **contact: Any) -> None:
         """Add the plane `floor`, and the pillars `floor_pillar_<number>`, each a body that `mocap_pos` moves."""
         super().add_to(root, contype=0, **contact)
         for number, place in enumerate(self.places(np.zeros((COUNT, 2)))):

@@ -2,7 +2,7 @@
 
 import dataclasses
 import functools
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -60,7 +60,7 @@ class SolidGround(Mapped):
 
     solids: Solids
 
-    def add_to(self, root: mjcf.RootElement, **contact) -> None:
+    def add_to(self, root: mjcf.RootElement, **contact: Any) -> None:
         """Add the solids `floor_<number>`, and the first plane as `floor`."""
         _add_solids(root, self.solids, self._start_height, **contact)
 

@@ -8,7 +8,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from dm_control import mjcf
@@ -155,7 +155,7 @@ class Terrain(Arena):
         """Return y (...) of the middle of lanes (...), m; x of the start is 0."""
         return (lane - len(self.lanes) // 2) * (WIDTH * self.unit)
 
-    def add_to(self, root: mjcf.RootElement, **contact) -> None:
+    def add_to(self, root: mjcf.RootElement, **contact: Any) -> None:
         """Add the height field `floor`, the boxes `floor_<number>`, and under them the plane `floor_bottom`."""
         unit = self.unit
         if self._num_fields:

@@ -381,11 +381,11 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         return tuple(pictures)
 
     @one_thread_at_a_time
-    def close(self, **kwargs) -> None:
+    def close(self, **kwargs: Any) -> None:
         """Free the simulations; a second call does nothing."""
         super().close(**kwargs)
 
-    def close_extras(self, **kwargs) -> None:
+    def close_extras(self, **kwargs: Any) -> None:
         """Free the simulations; `close` calls it."""
         for place in self._places:
             place.group.close()

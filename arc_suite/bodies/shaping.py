@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from arc_suite import checks
 from arc_suite.bodies import generator
@@ -57,7 +57,7 @@ def link_ends(body: Body) -> dict[str, Vector]:
     return {leg.full_name(link): link.end for leg in body.legs for link in leg.links}
 
 
-def shaped(body: Body, **changes) -> Body:
+def shaped(body: Body, **changes: Any) -> Body:
     """Return a body of other proportions, to be sized anew; its lowest foot stands on the floor.
 
     Args:

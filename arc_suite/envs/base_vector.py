@@ -20,7 +20,7 @@ _SINGLE_ATTRIBUTES = {"observation_space": "single_observation_space", "action_s
 class BaseVectorEnv(gymnasium.vector.VectorEnv[Any, np.ndarray, np.ndarray]):
     """A vector environment with the attributes and methods of each of its environments."""
 
-    def call(self, name: str, *args, **kwargs) -> tuple:
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple:
         """Call a method, or read an attribute, of every environment, as Gymnasium's own vector environments do.
 
         Args:

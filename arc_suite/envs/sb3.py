@@ -111,7 +111,7 @@ class VecEnv(vec_env.VecEnv):
         self._check_all(attr_name, indices)
         self.environments.set_attr(attr_name, value)
 
-    def env_method(self, method_name: str, *method_args, indices=None, **method_kwargs) -> list:
+    def env_method(self, method_name: str, *method_args: Any, indices=None, **method_kwargs: Any) -> list:
         """Call a method of all environments, see `VectorEnv.call`; a method with a mask also of some.
 
         Raises:

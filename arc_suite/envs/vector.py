@@ -493,7 +493,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         return tuple(self._picture_of(index) for index in self._checked_indices(indices))
 
     @one_thread_at_a_time
-    def close(self, **kwargs) -> None:
+    def close(self, **kwargs: Any) -> None:
         """Free the simulations; a second call does nothing.
 
         Raises:
@@ -501,7 +501,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         """
         super().close(**kwargs)
 
-    def close_extras(self, **kwargs) -> None:
+    def close_extras(self, **kwargs: Any) -> None:
         """Free the simulations; `close` calls it."""
         self.batch = None
 

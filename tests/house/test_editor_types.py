@@ -18,7 +18,15 @@ pytest.importorskip("mypy")
 
 # Page and number of a block of Python.
 PROGRAMS = (
-    *(("README", 0), ("README", 1), ("first_steps", 2), ("first_steps", 3), ("bodies", 0), ("demonstrators", 1)),
+    *(
+        ("README", 0),
+        ("README", 1),
+        ("first_steps", 2),
+        ("first_steps", 3),
+        ("bodies", 0),
+        ("bodies", 2),
+        ("demonstrators", 1),
+    ),
     *(
         ("directed", 0),
         ("modifiers", 0),

@@ -4,7 +4,7 @@ import contextlib
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
@@ -75,7 +75,7 @@ class RunContext(NamedTuple):
         """The first seed of the environments to learn in; no evaluation and no other run has it."""
         return seed_ranges.of_run(self.seed).start
 
-    def environment(self, num_envs: int = 1, **options) -> VectorEnv | BodiesEnv:
+    def environment(self, num_envs: int = 1, **options: Any) -> VectorEnv | BodiesEnv:
         """Return environments to learn in, whose seeds no evaluation and no other run has.
 
         Their `reset()` begins the first episodes. For the options see `VectorEnv`.
