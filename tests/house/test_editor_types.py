@@ -28,6 +28,7 @@ PROGRAMS = (
         ("demonstrators", 1),
     ),
     *(
+        ("demonstrators", 1),
         ("directed", 0),
         ("modifiers", 0),
         ("study", 0),
