@@ -18,26 +18,9 @@ pytest.importorskip("mypy")
 
 # Page and number of a block of Python.
 PROGRAMS = (
-    *(
-        ("README", 0),
-        ("README", 1),
-        ("first_steps", 2),
-        ("first_steps", 3),
-        ("bodies", 0),
-        ("bodies", 2),
-        ("demonstrators", 1),
-    ),
-    *(
-        ("demonstrators", 1),
-        ("directed", 0),
-        ("modifiers", 0),
-        ("study", 0),
-        ("pages", 0),
-        ("doors", 6),
-        ("environments", 1),
-        ("observations", 2),
-        ("coming_from_dm_control", 0),
-    ),
+    *(("README", 0), ("README", 1), ("first_steps", 2), ("first_steps", 3), ("bodies", 0), ("bodies", 2)),
+    *(("demonstrators", 1), ("directed", 0), ("modifiers", 0), ("study", 0), ("pages", 0), ("doors", 6)),
+    *(("environments", 1), ("observations", 2), ("coming_from_dm_control", 0)),
 )
 # Those whose functions have no annotations, as people write them, and those that use what other packages leave open.
 PLAIN_PROGRAMS = (
