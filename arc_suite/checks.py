@@ -559,31 +559,37 @@ def preview(value: Any) -> str:
         return f"a {type(value).__name__} that cannot be shown"
 
 
-def describe_syntax_error(error: SyntaxError) -> str:
-    """Return file, line and reason of a module that is no Python, for errors."""
-    return quote(f"{error.filename}, line {error.lineno}: {error.msg}")
+def describe_import_error(error: ImportError | SyntaxError, module: str) -> str:
+    """Return why a module that a user names cannot be imported, for errors."""
+    if isinstance(error, SyntaxError):
+        return quote(f"{error.filename}, line {error.lineno}: {error.msg}")
+    if error.name != module:  # the module imports another one, which is missing
+        return quote(error)
+    return f"{quote(error)}; start in the folder of {module[:_MAX_PATH]}.py, or put it on Python's path"
 
 
-def import_object(path: str, kind: str, resolve: Callable[[str], Any] = pkgutil.resolve_name) -> Any:
+def import_object(path: str, subject: str, resolve: Callable[[str], Any] = pkgutil.resolve_name) -> Any:
     """Import the module in `module:name`, and return the object of that name in it.
 
     Args:
         path: the text `module:name`.
-        kind: what the object is for, such as "policy"; errors begin with it.
+        subject: what errors have before the path, such as "policy".
         resolve: function from the path to the object.
 
     Raises:
         ValueError: the module cannot be imported, is no Python, or has no such name.
     """
+    module = path.partition(":")[0]
     try:
         return resolve(path)
-    except SyntaxError as error:
-        raise ValueError(f"{kind} {path[:_MAX_PATH]!r}: {describe_syntax_error(error)}") from None
-    except (ImportError, ValueError, AttributeError) as error:
-        suggestion = describe_other_module(path.partition(":")[0])
+    except (ImportError, SyntaxError) as error:
+        reason = describe_import_error(error, module)
+    except (ValueError, AttributeError) as error:
+        suggestion = describe_other_module(module)
         if not suggestion and isinstance(error, AttributeError):
             suggestion = hint(error.name, dir(error.obj))
-        raise ValueError(f"{kind} {path[:_MAX_PATH]!r}: {quote(error)}{suggestion}") from None
+        reason = f"{quote(error)}{suggestion}"
+    raise ValueError(f"{subject} {path[:_MAX_PATH]!r}: {reason}")
 
 
 def describe_other_module(module: str) -> str:

@@ -482,10 +482,9 @@ def find(kind: str, name: str, suite: Mapping[str, Any]) -> Any:
         ValueError: as `find_entry`, or a value that cannot be imported.
     """
     entry = find_entry(kind, name, suite)
-    try:
-        return resolve(entry)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise ValueError(f"{kind} {bare_name(name)!r}: cannot import {entry}: {checks.quote(error)}") from None
+    if isinstance(entry, str):
+        return checks.import_object(entry, f"{kind} {bare_name(name)!r}: cannot import")
+    return entry
 
 
 def find_entry(kind: str, name: str, suite: Mapping[str, Any]) -> Any:
@@ -550,14 +549,9 @@ def import_module(module: str, subject: str) -> None:
     """
     try:
         importlib.import_module(module)
-    except SyntaxError as error:
-        raise ValueError(f"{subject}: {checks.describe_syntax_error(error)}") from None
-    except ImportError as error:
-        shown_module = module[:_MAX_QUOTE]
-        message = f"{subject}: cannot import {shown_module}: {checks.quote(error)}"
-        if error.name == module:  # the module itself was not found, rather than one that it imports
-            message += f"; start in the folder of {shown_module}.py, or put it on Python's path"
-        raise ValueError(message) from None
+    except (ImportError, SyntaxError) as error:
+        reason = checks.describe_import_error(error, module)
+        raise ValueError(f"{subject}: cannot import {module[:_MAX_QUOTE]}: {reason}") from None
 
 
 def _refuse_file(kind: str, name: str) -> None:

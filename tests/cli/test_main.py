@@ -169,7 +169,9 @@ def test_modules_of_the_current_folder_come_last(tmp_path):
     programs.passed(programs.arc_suite(*evaluate, "--policy=pol:make", cwd=tmp_path))
     assert programs.arc_suite("collect", "--verify=a/b-v0", cwd=tmp_path).stderr.startswith("arc-suite collect: ")
     done = programs.arc_suite(*evaluate, "--policy=lop:make", cwd=tmp_path)
-    programs.refused(done, "arc-suite evaluate: policy 'lop:make': No module named 'lop'\n")
+    programs.refused(
+        done, "arc-suite evaluate: policy 'lop:make': No module named 'lop'; start in the folder of lop.py, or "
+    )
 
 
 @pytest.mark.slow

@@ -218,7 +218,11 @@ CASES = [
     (lambda w: w.envs.task.split(np.zeros((2, 199))), "observation: expected 151 numbers, got shape (2, 199)"),
     (policy(None, "queen"), f"unknown policy None {POLICIES}"),
     (policy("cpg", "quene"), f"unknown robot 'quene'; did you mean 'queen'? {DOMAINS}"),
-    (policy("nowhere:policy", "queen"), "policy 'nowhere:policy': No module named 'nowhere'"),
+    (
+        policy("nowhere:policy", "queen"),
+        "policy 'nowhere:policy': No module named 'nowhere'; "
+        "start in the folder of nowhere.py, or put it on Python's path",
+    ),
     # Paths.
     (load("missing.json", "walk"), "cannot read missing.json: no such file or directory"),
     (load("folder.json", "walk"), "cannot read folder.json: is a directory"),

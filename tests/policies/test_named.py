@@ -142,7 +142,10 @@ def test_policies_from_pythons_path_learn_the_name_of_a_robot_and_the_body_of_an
 @pytest.mark.parametrize(
     ("path", "message"),
     [
-        ("own_polices:walk", "No module named 'own_polices'"),
+        (
+            "own_polices:walk",
+            "No module named 'own_polices'; start in the folder of own_polices.py, or put it on Python's path",
+        ),
         (":walk", "invalid format: ':walk'"),
         ("own_policies:wlak", "module 'own_policies' has no attribute 'wlak'; did you mean 'walk'?"),
         ("own_policies.py:wlak", "module 'own_policies.py' has no attribute 'wlak'; did you mean 'walk'?"),

@@ -113,8 +113,15 @@ def test_a_name_may_have_its_module(monkeypatch, register):
     [
         (3, f"clip 'mine': expected one of {KINDS}, got int"),
         ("math:pi", f"clip 'mine': expected one of {KINDS}, got float"),
-        ("math:tau_", "clip 'mine': cannot import math:tau_: module 'math' has no attribute 'tau_'"),
-        ("no_such:a", "clip 'mine': cannot import no_such:a: No module named 'no_such'"),
+        (
+            "math:tau_",
+            "clip 'mine': cannot import 'math:tau_': module 'math' has no attribute 'tau_'; did you mean 'tau'?",
+        ),
+        (
+            "no_such:a",
+            "clip 'mine': cannot import 'no_such:a': No module named 'no_such'; "
+            "start in the folder of no_such.py, or put it on Python's path",
+        ),
         (Acted(lambda body, rest: None, (0,)), "tick, clip mine: expected a ClipMotion of its play, got NoneType"),
         (Difference("idle", "walk"), "tick, clip mine: idle is no loop that is recorded"),
         (Showcase("prowl"), "tick, clip mine: tick has no preset prowl"),

@@ -57,7 +57,7 @@ def test_a_function_that_makes_no_architecture_is_one_line(networks):
     task = Setup.of("tick").definition
     with refused("network 'mine': has no symmetric and no size and no action_inputs and ", begins=True):
         architectures.of(task, "mine")
-    with refused("network 'lost': cannot import nowhere:Deep.of: No module named 'nowhere'"):
+    with refused("network 'lost': cannot import 'nowhere:Deep.of': No module named 'nowhere'; start ", begins=True):
         architectures.of(task, "lost")
     names = "(there are: perceptron, legs, mine, lost, half, module:name)"
     with refused(f"unknown network 'lost_'; did you mean 'lost'? {names}"):
