@@ -166,10 +166,7 @@ def load(path: str | os.PathLike[str]) -> Network:
         path = path / FILE
     if not path.exists():
         is_of_run = path.name == FILE and path.parent.is_dir()
-        if is_of_run:
-            hint = "; a run writes it at its first evaluation"
-        else:
-            hint = checks.hint(str(path), map(str, path.parent.glob("*")))
+        hint = "; a run writes it at its first evaluation" if is_of_run else files.suggest_path(path)
         raise OSError(f"cannot read {path}: no such file{hint}")
     try:
         with parsers.guard(f"{path}: no policy, or a damaged one", passes=(registry.NotImported,)):

@@ -239,7 +239,7 @@ def test_no_file_is_one_line(tmp_path):
 
 def test_no_run_of_that_name_is_one_line_with_one_that_is_there(saved, monkeypatch):
     monkeypatch.chdir(saved)
-    with pytest.raises(OSError, match=r"^cannot read polisy\.npz: no such file; did you mean 'policy\.npz'\?$"):
+    with pytest.raises(OSError, match=r"^cannot read polisy\.npz: no such file; did you mean policy\.npz\?$"):
         network.load("polisy.npz")
 
 
