@@ -2,6 +2,8 @@
 
 import math
 
+NO_TURN = (1.0, 0.0, 0.0, 0.0)  # the quaternion of a frame that is oriented as the one above
+
 
 def wrap_angle(angle):
     """Return the equivalent angles (...) in [-pi, pi), rad."""

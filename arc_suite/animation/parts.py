@@ -21,7 +21,6 @@ from arc_suite.robots.spec import Body, Link
 KINDS = {int(geom): name for name, geom in GEOMS.items()}  # kinds of shapes by MuJoCo's number
 
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
-_NO_TURN = np.array((1.0, 0.0, 0.0, 0.0))  # the quaternion of a part that is oriented as the one above
 _FIRST_HIDDEN_GROUP = 3  # of geoms; MuJoCo draws those below
 _TORSO_POSITIONS = 7  # numbers of the torso in qpos; those of the joints follow
 
@@ -159,7 +158,7 @@ def _bone_part(model: mujoco.MjModel, bone: SwingingBone, geoms: list[int]) -> P
         name=bone.name,
         parent=0,
         place=bone.place,
-        quaternion=_NO_TURN,
+        quaternion=np.array(rotations.NO_TURN),
         joint=None,
         axis=None,
         shapes=tuple(shape._replace(place=shape.place - bone.place) for shape in shapes),
@@ -292,7 +291,7 @@ def _parts_without_shapes(body: Body, torso_position: np.ndarray, torso_quaterni
     for leg in body.legs:
         parent = 0  # the torso
         position = leg.mount
-        quaternion = rotations.turn_about_z(_NO_TURN, np.radians(leg.yaw_deg))
+        quaternion = rotations.turn_about_z(np.array(rotations.NO_TURN), np.radians(leg.yaw_deg))
         for link in leg.parts:  # the last one is a foot
             hinge = link.joint if isinstance(link, Link) else None
             joint = None
@@ -313,5 +312,5 @@ def _parts_without_shapes(body: Body, torso_position: np.ndarray, torso_quaterni
             )
             parent = len(parts) - 1
             position = link.end if isinstance(link, Link) else None
-            quaternion = _NO_TURN
+            quaternion = np.array(rotations.NO_TURN)
     return parts

@@ -247,7 +247,7 @@ def _simulate_leaps(body: Body, rest_angles: np.ndarray, targets: np.ndarray) ->
     data = batch.data
     every_leap = np.ones(leap_count, bool)
     start_height = -rest_pose.soles[:, 2].min()
-    start_torso = (0.0, 0.0, start_height, 1.0, 0.0, 0.0, 0.0)  # position, m, and quaternion
+    start_torso = (0.0, 0.0, start_height, *rotations.NO_TURN)  # position, m, and quaternion
     start_qpos = readings.positions(np.concatenate([start_torso, rest_angles]), layout, standing_qpos(model))
     batch.reset(every_leap, np.tile(start_qpos, (leap_count, 1)), np.zeros_like(data.qvel))
 

@@ -8,7 +8,7 @@ import imageio.v3 as imageio
 import mujoco
 import numpy as np
 
-from arc_suite import files, parsers
+from arc_suite import files, parsers, rotations
 from arc_suite.arenas import ground_text, height_map
 from arc_suite.arenas.height_map import HeightMap
 from arc_suite.arenas.mapped import MAX_SIDE
@@ -199,10 +199,10 @@ def _read_geom(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Solid:
     if geom_type == _PLANE:
         if axes[2, 2] < 1.0 - 1e-9:
             raise ValueError(f"geom {name[:_MAX_NAME]!r}: expected a level plane; a tilted one can be a box")
-        return Solid(kind, _round((0.0, 0.0, data.geom_xpos[geom, 2])), (1.0, 0.0, 0.0, 0.0))
+        return Solid(kind, _round((0.0, 0.0, data.geom_xpos[geom, 2])), rotations.NO_TURN)
     if geom_type == _MESH:
         corners = hull_points(model, geom) @ axes.T + data.geom_xpos[geom]
-        return Solid(kind, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), points=tuple(_round(corner) for corner in corners))
+        return Solid(kind, (0.0, 0.0, 0.0), rotations.NO_TURN, points=tuple(_round(corner) for corner in corners))
     quat = np.zeros(4)
     mujoco.mju_mat2Quat(quat, data.geom_xmat[geom])
     size = model.geom_size[geom, : SIZES[kind]]

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
+from arc_suite import rotations
 from arc_suite.robots.spec import SpecError
 
 FREE = int(mujoco.mjtJoint.mjJNT_FREE)
@@ -18,7 +19,6 @@ DOWN = np.array((0.0, 0.0, -1.0))
 Chain = tuple[int, ...]
 
 _GEOM = mujoco.mjtGeom
-_NO_TURN = (1.0, 0.0, 0.0, 0.0)
 
 
 class Robot(NamedTuple):
@@ -96,7 +96,7 @@ class Robot(NamedTuple):
             data = mujoco.MjData(self.model)
         start = self.model.jnt_qposadr[self.model.body_jntadr[self.root]]  # of the torso's pose in qpos
         data.qpos[:] = qpos
-        data.qpos[start : start + 7] = (*(0.0 - self.torso_place), *_NO_TURN)
+        data.qpos[start : start + 7] = (*(0.0 - self.torso_place), *rotations.NO_TURN)
         mujoco.mj_kinematics(self.model, data)
         mujoco.mj_comPos(self.model, data)
         return data

@@ -12,6 +12,7 @@ from xml.etree.ElementTree import SubElement
 import mujoco
 import numpy as np
 
+from arc_suite import rotations
 from arc_suite.importing import loops
 from arc_suite.importing.facing import LEVEL
 from arc_suite.importing.loops import Loop
@@ -304,5 +305,5 @@ def _add_constraint(section: ElementTree.Element, robot: Robot, loop: Loop) -> E
 def _home_qpos(robot: Robot, stance: Stance) -> list[float]:
     """Return qpos of the standing pose in the model of the source."""
     root_position = (0.0, 0.0, stance.height) - robot.torso_place  # where the torso's frame is level
-    root_pose = [*root_position, 1.0, 0.0, 0.0, 0.0]  # position and quaternion
+    root_pose = [*root_position, *rotations.NO_TURN]
     return root_pose + [stance.qpos[robot.qpos_index(joint)] for joint in robot.joints]

@@ -4,6 +4,8 @@ import numpy as np
 from dm_control import mjcf
 from lxml import etree
 
+from arc_suite import rotations
+
 
 def to_mjcf(root: mjcf.RootElement) -> str:
     """Return a model of `assemble` as MJCF, with the standing pose as the keyframe `home`.
@@ -27,7 +29,7 @@ def to_mjcf(root: mjcf.RootElement) -> str:
         del element.attrib["class"]
     if root.find("joint", "root") and not root.find("key", "home"):
         hinges = [joint for joint in root.find_all("joint") if joint.tag == "joint"]
-        torso_pose = (*root.find("body", "torso").pos, 1.0, 0.0, 0.0, 0.0)  # position and quaternion
+        torso_pose = (*root.find("body", "torso").pos, *rotations.NO_TURN)
         keyframe = etree.SubElement(tree, "keyframe")
         home = etree.SubElement(keyframe, "key", name="home")
         home.set("qpos", exact((*torso_pose, *(0.0 for _ in hinges))))

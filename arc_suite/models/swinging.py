@@ -95,7 +95,7 @@ def _make_bone(body: Body, bone: visuals.Bone) -> SwingingBone:
 
 def rest_turns(body: Body, samples: int) -> np.ndarray:
     """Return the turns (samples, bones, 4) of bones at rest."""
-    return np.tile((1.0, 0.0, 0.0, 0.0), (samples, len(list_bones(body)), 1))
+    return np.tile(rotations.NO_TURN, (samples, len(list_bones(body)), 1))
 
 
 def hold_mass(bone: SwingingBone, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:

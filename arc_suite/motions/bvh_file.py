@@ -140,7 +140,7 @@ def _pose(joints: list[_Joint], numbers: np.ndarray) -> tuple[np.ndarray, np.nda
     column = 0
     for index, joint in enumerate(joints):
         local_position = np.tile(joint.offset, (frames, 1))
-        quaternion = np.tile((1.0, 0.0, 0.0, 0.0), (frames, 1))
+        quaternion = np.tile(rotations.NO_TURN, (frames, 1))
         for channel in joint.channels:
             axis = _AXES[channel[:1]]
             if channel[1:] == "position":  # in place of the offset

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from arc_suite import rotations
 from arc_suite.models import foot_paths
 from arc_suite.models.posture import find_rest_pose
 from arc_suite.motions.motion import Motion, make
@@ -35,7 +36,7 @@ def stride(body: Body, frequency: float, duty_factor: float, offsets: np.ndarray
     times = np.arange(steps + 1) / (steps * frequency)
     torso_height = -rest_pose.sole_positions[:, 2].mean()
     positions = np.stack([velocity * times, 0.0 * times, np.full(steps + 1, torso_height)], axis=-1)
-    quaternions = np.tile((1.0, 0.0, 0.0, 0.0), (steps + 1, 1))
+    quaternions = np.tile(rotations.NO_TURN, (steps + 1, 1))
     phases = np.arange(steps + 1)[:, None] / steps + offsets
     return make(
         body,
