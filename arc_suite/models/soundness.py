@@ -54,15 +54,16 @@ def flaws(body: Body) -> list[Flaw]:
     Where the standing height is far off, it is the only flaw: strokes and strides are compared with it.
     """
     pose = measure_standing(body)
-    height_flaws = [*_check_feet(body, pose), *_check_torso(body, pose)]
+    height_flaws = [*_check_height(body, pose)]
     if any(flaw.hopeless for flaw in height_flaws):
         return height_flaws
-    return [*_check_all_but_overlaps(body), *_check_overlaps(body)]
+    return [*height_flaws, *_check_legs_and_joints(body, pose), *_check_overlaps(body)]
 
 
 def has_flaws(body: Body) -> bool:
     """Return whether a body has flaws; it is quicker than `flaws`, as it looks for no second one and for no cure."""
-    return any(_check_all_but_overlaps(body)) or any(overlaps(body))
+    pose = measure_standing(body)
+    return any(_check_height(body, pose)) or any(_check_legs_and_joints(body, pose)) or any(overlaps(body))
 
 
 def hopeless_flaws(body: Body) -> list[Flaw]:
@@ -77,10 +78,15 @@ def hopeless_flaws(body: Body) -> list[Flaw]:
     return body_flaws
 
 
-def _check_all_but_overlaps(body: Body) -> Iterator[Flaw]:
-    """Find all flaws except overlaps, which take the longest to find."""
-    pose = measure_standing(body)
-    for check in (_check_feet, _check_torso, _check_legs, _check_mounts, _check_support, _check_motors, _check_joints):
+def _check_height(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
+    """Find feet and parts of the torso at a wrong height above the floor."""
+    yield from _check_feet(body, pose)
+    yield from _check_torso(body, pose)
+
+
+def _check_legs_and_joints(body: Body, pose: PoseMechanics) -> Iterator[Flaw]:
+    """Find all other flaws except overlaps, which take the longest to find."""
+    for check in (_check_legs, _check_mounts, _check_support, _check_motors, _check_joints):
         yield from check(body, pose)
 
 
