@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import checks, rotations
+from arc_suite.arenas import Arena
 from arc_suite.models import visuals
 from arc_suite.models.standing import time_unit
 from arc_suite.models.visuals.springs import SPRINGS
@@ -186,15 +187,16 @@ class Swinging:
         self._states: list[State] = []
         self._time = math.inf
 
-    def follow(self, time: float, torso: np.ndarray, ground: float) -> list[np.ndarray]:
+    def follow(self, time: float, torso: np.ndarray, arena: Arena) -> list[np.ndarray]:
         """Return how bones are turned in the torso's frame, (4,) each.
 
         Args:
             time: s, of the simulation; an earlier one than before begins anew.
             torso: (7,) position, m, and quaternion of the torso.
-            ground: height of the ground below it, m.
+            arena: ground below it.
         """
         position = torso[:3]
+        ground = float(arena.height(*position[:2]))
         orientation = rotations.matrix(torso[3:7])
         anchors = [hold_mass(bone, position, orientation) for bone in self._bones]
         if time < self._time:

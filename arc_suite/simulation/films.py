@@ -125,8 +125,8 @@ class Footage:
             steps: control steps since the start of the episode; not fewer than in the last call.
             qpos: (nq,) positions of the simulation at that time.
         """
-        ground = float(self._environment.physics.arena.height(*qpos[:2]))
-        return self._swinging.follow(steps * self.control_timestep, qpos[:7], ground)
+        arena = self._environment.physics.arena
+        return self._swinging.follow(steps * self.control_timestep, qpos[:7], arena)
 
     def _state(self) -> tuple[np.ndarray, np.ndarray]:
         """Return qpos (nq,) and qvel (nv,)."""

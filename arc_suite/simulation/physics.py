@@ -248,9 +248,7 @@ class Physics(dm_mujoco.Physics):
         if self._decorated is None:
             self._decorated = pictures.Decorated.from_body(self.body, self.arena)
             self._swinging = Swinging(list_bones(self.body))
-        qpos = self.data.qpos
-        ground = float(self.arena.height(*qpos[:2]))
-        swings = self._swinging.follow(self.data.time, qpos[:7], ground)
+        swings = self._swinging.follow(self.data.time, self.data.qpos[:7], self.arena)
         self._decorated.pose(**self._pose(), swings=swings)
         return self._decorated
 

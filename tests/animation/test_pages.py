@@ -16,6 +16,7 @@ from PIL import Image
 
 import arc_suite
 from arc_suite.animation import pages, scenery
+from arc_suite.arenas import FLAT
 from arc_suite.models import swinging
 from arc_suite.policies import policy
 from arc_suite.robots import ROBOTS
@@ -224,7 +225,7 @@ def test_the_picture_is_the_track(shown, tracks):
             np.testing.assert_allclose([walk[name] for name in body.part_names], data.xpos[parts], atol=1e-4)
             bones = swinging.Swinging(swinging.list_bones(body))
             poses = qpos_of(track)[: row + 1, :7]
-            turns = [bones.follow(index * track.time_step, pose, 0.0) for index, pose in enumerate(poses)][-1]
+            turns = [bones.follow(index * track.time_step, pose, FLAT) for index, pose in enumerate(poses)][-1]
             np.testing.assert_allclose(np.abs(walk["turns"]), np.abs(turns), atol=1e-3)
     track = tracks["tick, tuned"]
     places = shown.evaluate(f"viewer.seek({track.times[9] + 0.5 * track.time_step}), viewer.places()")

@@ -1,6 +1,7 @@
 """Bones of ornaments: they lag, settle, stay above the ground, hold their shapes, and swing in pages as in Python."""
 
 import pathlib
+import types
 
 import nodes
 import numpy as np
@@ -10,6 +11,7 @@ from arc_suite import rotations
 from arc_suite.animation import pages
 from arc_suite.animation.clips.meshes import part_meshes
 from arc_suite.animation.parts import describe_body
+from arc_suite.arenas import FLAT
 from arc_suite.bodies.families import sound_body, varied_body
 from arc_suite.models import swinging
 from arc_suite.models.visuals.springs import SPRINGS
@@ -20,10 +22,10 @@ BODIES = {body.name: body for body in (*ROBOTS.values(), *GENERATED)}
 STEP = 0.01  # s
 
 
-def turned(body, poses, ground=0.0):
+def turned(body, poses):
     """How the first bone is turned at each pose (7,) of a torso."""
     bones = swinging.Swinging(swinging.list_bones(body))
-    return np.array([bones.follow(STEP * row, pose, ground)[0] for row, pose in enumerate(poses)])
+    return np.array([bones.follow(STEP * row, pose, FLAT)[0] for row, pose in enumerate(poses)])
 
 
 def standing(body, samples):
@@ -121,7 +123,8 @@ def test_pages_swing_bones_as_python_does(tmp_path):
         times = random.uniform(0.001, 0.05, len(poses)).cumsum()
         bones = swinging.Swinging(swinging.list_bones(body))
         ground = 0.5 * body.torso.standing_height
-        expected.append([bones.follow(time, pose, ground)[0] for time, pose in zip(times, poses, strict=True)])
+        arena = types.SimpleNamespace(height=lambda x, y, ground=ground: ground)
+        expected.append([bones.follow(time, pose, arena)[0] for time, pose in zip(times, poses, strict=True)])
         bone = pages.to_json_values(swinging.list_bones(body)[0], decimals=None)
         walks.append({"bone": bone, "times": times.tolist(), "poses": poses.tolist(), "ground": ground})
     np.testing.assert_allclose(nodes.run(script, walks), expected, atol=1e-9)

@@ -100,8 +100,7 @@ class Figure:
         torso_frame.wxyz = torso_quaternion
         for frame, quaternion in zip(self._hinged_frames, quaternions, strict=True):
             frame.wxyz = quaternion
-        ground = float(scene.arena.height(*torso_position[:2]))
-        swings = self._swinging.follow(seconds, pose[:7], ground)
+        swings = self._swinging.follow(seconds, pose[:7], scene.arena)
         for frame, quaternion in zip(self._swinging_frames, swings, strict=True):
             frame.wxyz = quaternion
         return torso_position
