@@ -364,7 +364,7 @@ class CommandTask(GaitTask):
         height_share = gait.height_share(gait_memory)  # of the standing height, that the command asks for
         health = self.health.after(context, memory.health, readings, steps, height_share)
         motion = self._mean_motion(core, place)
-        gait_memory = gait.after(context, gait_memory, readings, self._share_in_schedule(schedule_errors))
+        gait_memory = gait.after(context, gait_memory, readings, schedule_errors)
         followed = self.settings.command.follow(context, memory.command, steps, core.place, place, motion, readings)
         ground = self.settings.ground.after(context, memory.ground, place, readings, followed.arrived)
         core = Core(
@@ -383,10 +383,6 @@ class CommandTask(GaitTask):
             all_tracking=core.all_tracking + followed.tracking,
         )
         return CommandTaskMemory(core, followed.memory, ground, health, gait_memory)
-
-    def _share_in_schedule(self, schedule_errors):
-        """Return the share (...) of the feet that follow the contact schedule, given its errors (...)."""
-        return 1.0 - schedule_errors / self.parameters.feet
 
     def _mean_motion(self, core: Core, place):
         """Return the mean velocity (..., 3); that of a step is relative to the heading at its start."""
@@ -417,7 +413,7 @@ class CommandTask(GaitTask):
         core = memory.core
         height = self.context.height
         gait = self._gait
-        feet_in_schedule = self._share_in_schedule(core.schedule_errors)
+        feet_in_schedule = clock.compliance(core.schedule_errors, 1, self.parameters.feet)
         bonuses = self.settings.command.terms(
             memory.command, core.step_tracking, memory.health.upright, feet_in_schedule
         )

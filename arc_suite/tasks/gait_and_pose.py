@@ -17,7 +17,7 @@ from arc_suite.robots import gaits
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import terms
 from arc_suite.tasks.blocks import Block, gait_clock
-from arc_suite.tasks.clock import TWO_PI
+from arc_suite.tasks.clock import TWO_PI, compliance
 from arc_suite.tasks.command import BAND, COMMANDS, LONGEST, SHORTEST, begins_next, scheduled_value
 from arc_suite.tasks.context import Context
 from arc_suite.tasks.parts import ROTATIONS, Legs, Planar, Scalar
@@ -271,14 +271,14 @@ class GaitAndPose:
         phase = (memory.phase + gait[..., -1] * is_going) % CYCLE
         return memory._replace(pose=pose, gait=gait, phase=phase)
 
-    def after(self, context: Context, memory: GaitAndPoseMemory, readings, feet_in_schedule) -> GaitAndPoseMemory:
+    def after(self, context: Context, memory: GaitAndPoseMemory, readings, schedule_errors) -> GaitAndPoseMemory:
         """Return the memory with how well the torso keeps its pose, and the feet their schedule.
 
         Args:
             context: context of the task.
             memory: from `advance`.
             readings: after the step.
-            feet_in_schedule: (...) share of the feet that followed the contact schedule.
+            schedule_errors: (...) number of contact schedule errors in the step.
         """
         xp = memory.pose.__array_namespace__()
         leak = context.leak
@@ -288,6 +288,7 @@ class GaitAndPose:
         translation_tracking = tracking_of_pose(pose[..., :3], pose_error[..., :3])
         rotation_tracking = tracking_of_pose(pose[..., 3:], pose_error[..., 3:])
         pose_tracking = translation_tracking * rotation_tracking
+        feet_in_schedule = compliance(schedule_errors, 1, readings.foot_heights.shape[-1])
         return memory._replace(
             pose_error=pose_error,
             pose_tracking=pose_tracking,

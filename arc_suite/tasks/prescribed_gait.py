@@ -54,7 +54,7 @@ class PrescribedGait:
     def advance(self, context: Context, memory: None, steps, is_going) -> None:
         """Return no memory."""
 
-    def after(self, context: Context, memory: None, readings, feet_in_schedule) -> None:
+    def after(self, context: Context, memory: None, readings, schedule_errors) -> None:
         """Return no memory."""
 
     def with_command(self, memory: None, name: str, value) -> None:
