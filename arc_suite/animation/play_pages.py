@@ -33,7 +33,7 @@ from arc_suite.cpg.stepping import Stepping
 from arc_suite.envs.setup import Setup
 from arc_suite.models import posture
 from arc_suite.models.kinematics import Legs
-from arc_suite.models.standing import GRAVITY, measure_standing
+from arc_suite.models.standing import GRAVITY, measure_standing, time_unit
 from arc_suite.policies import other_libraries
 from arc_suite.policies.network import Network
 from arc_suite.robots import gaits
@@ -265,11 +265,10 @@ def _describe_pose_and_gait(task: Task, run: float | None) -> dict[str, Any]:
     """
     body = task.scene.body
     reference = task.context.reference  # type: ignore[attr-defined]  # of tasks with commands
-    time_unit = (body.torso.standing_height / GRAVITY) ** 0.5  # s
     return {
         "glide": reference.glide,
         "step": reference.step,
-        "rate": time_unit / reference.step,
+        "rate": time_unit(body) / reference.step,
         "names": posture.POSE_NAMES,
         "room": player_controls.pose_room(body),
         "frequency": task.parameters.gait_frequency,
