@@ -8,7 +8,7 @@ import os
 import pkgutil
 import re
 import sys
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -238,6 +238,7 @@ _VERSION = re.compile(r"-v\d{1,3}$")  # of Gymnasium's names
 _MIN_NAMED_BOUND = 1e-6
 _MAX_DIGITS = 20  # of an integer in a text
 _MAX_QUOTE = 300  # characters
+_MAX_NAMES = 4  # of a list of which an error has the first ones
 _SAME_WORD = 0.9  # similarity, up to 1, of two spellings of one word
 _SIMILAR_WORD = 0.66  # the same of a word with mistakes
 _MAX_PATH = 80  # characters of a path `module:name` in an error
@@ -549,6 +550,12 @@ def json_text(what: str, value: Any) -> str:
 def quote(value: Any) -> str:
     """Return the beginning of a value's text, in one line; for texts of unknown length, such as foreign errors."""
     return " ".join(str(value).split())[:_MAX_QUOTE]
+
+
+def join_first(names: Sequence[str]) -> str:
+    """Return the first names, with commas between them, and dots if there are more."""
+    more = ", ..." if len(names) > _MAX_NAMES else ""
+    return ", ".join(names[:_MAX_NAMES]) + more
 
 
 def preview(value: Any) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import mujoco
 import numpy as np
 
-_MAX_NAMES = 4  # of links in one note
+from arc_suite import checks
 
 
 def describe_links(links: Mapping[str, ElementTree.Element]) -> Iterator[str]:
@@ -19,12 +19,11 @@ def describe_links(links: Mapping[str, ElementTree.Element]) -> Iterator[str]:
     solid = [name for name in massless if links[name].find("collision") is not None]
     empty = [name for name in massless if name not in solid]
     if solid:
-        yield (
-            f"masses: {len(solid)} links with colliders have none in the file, and get 1000 kg/m^3 "
-            f"({_list_names(solid)})"
-        )
+        text = f"masses: {len(solid)} links with colliders have none in the file, and get 1000 kg/m^3"
+        yield f"{text} ({checks.join_first(solid)})"
     if empty:
-        yield f"masses: {len(empty)} links have none in the file and no collider: none here ({_list_names(empty)})"
+        text = f"masses: {len(empty)} links have none in the file and no collider: none here"
+        yield f"{text} ({checks.join_first(empty)})"
 
 
 def describe_bodies(spec: mujoco.MjSpec, model: mujoco.MjModel, torso: int) -> Sequence[str]:
@@ -43,9 +42,3 @@ def describe_bodies(spec: mujoco.MjSpec, model: mujoco.MjModel, torso: int) -> S
         f"masses: {len(inferred)} of {len(bodies)} bodies have no inertial in the file: they have the mass or density "
         "of their shapes",
     )
-
-
-def _list_names(names: Sequence[str]) -> str:
-    """Return the first names."""
-    more = ", ..." if len(names) > _MAX_NAMES else ""
-    return ", ".join(names[:_MAX_NAMES]) + more

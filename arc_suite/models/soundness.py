@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from arc_suite import checks
 from arc_suite.models import sizing, stride
 from arc_suite.models.outline import torso_box
 from arc_suite.models.overlap import measure_gaps, overlaps
@@ -31,7 +32,6 @@ _LOADS_OF_BRISK_STRIDE = 7.0
 
 _SPREADS = (1.1, 1.2, 1.3, 1.4, 1.5, 1.75, 2.0)  # factors of the legs' mounts, tried against overlaps
 _SHARES_OF_MOUNTS = np.arange(0.95, 0.0, -0.05)  # factors of mounts that are apart from the torso
-_MAX_NAMES = 4  # of legs in one text
 
 
 class Flaw(NamedTuple):
@@ -306,8 +306,7 @@ def _move_legs(body: Body, displacements: Iterable) -> Body:
 
 def _join_names(body: Body, is_named: np.ndarray) -> str:
     """Return the names of the first legs among those of a mask (legs,), with dots if there are more."""
-    names = [body.legs[index].name for index in np.flatnonzero(is_named)]
-    return ", ".join(names[:_MAX_NAMES]) + (", ..." if len(names) > _MAX_NAMES else "")
+    return checks.join_first([body.legs[index].name for index in np.flatnonzero(is_named)])
 
 
 def _lengthen_legs(body: Body, lengths: np.ndarray) -> Body:
