@@ -168,10 +168,20 @@ class Sighted(CommandLaw):
             vertical: (environments, 3) the world's, in the torso's frame.
         """
         xp = leg_phases.__array_namespace__()
-        duty_factor = self.duty_factor
-        is_stance = leg_phases < duty_factor
+        swing_places, shifts = self._move_to_footholds(state, leg_phases, velocity, predicted_velocity)
+        stance_places = self._move_with_ground(state, leg_phases, velocity)
+        is_stance = leg_phases < self.duty_factor
+        places = xp.where(is_stance[..., None], stance_places, swing_places)
+        heights = self._lift_feet(leg_phases, gait_size, vertical)
+        return xp.concatenate([places, heights[..., None]], axis=-1), shifts
 
-        # A foot in swing covers, in each control step, an equal part of the way that is left to its foothold.
+    def _move_to_footholds(self, state: SightedState, leg_phases, velocity, predicted_velocity) -> tuple:
+        """Return where feet in swing are next, (environments, legs, 2) m, and shifts of footholds; see `_next_feet`.
+
+        In each control step a foot covers an equal part of the way that is left to its foothold.
+        """
+        xp = leg_phases.__array_namespace__()
+        is_stance = leg_phases < self.duty_factor
         steps_to_landing = xp.where(is_stance, 0.0, (1.0 - leg_phases) / self.cycles_per_step)  # from the next step
         arrival_steps = xp.minimum(steps_to_landing, _ARRIVAL_STEPS)
         # How far the torso moves over the ground in a control step, at each foot, m.
@@ -181,19 +191,25 @@ class Sighted(CommandLaw):
         footholds_at_landing, shifts = self._find_footholds(state, velocity, torso_displacement, is_fixed)
         swing_goals = footholds_at_landing + torso_drift * arrival_steps[..., None]
         remaining_steps = (xp.floor(steps_to_landing - arrival_steps) + 1.0)[..., None]
-        swing_ground = state.feet[..., :2] + (swing_goals - state.feet[..., :2]) / remaining_steps
+        places = state.feet[..., :2]
+        return places + (swing_goals - places) / remaining_steps, shifts
 
-        # A foot in stance moves against the velocity, in its first step only since it landed.
+    def _move_with_ground(self, state: SightedState, leg_phases, velocity):
+        """Return where feet in stance are next, (environments, legs, 2) m; see `_next_feet`.
+
+        A foot moves against the velocity, in its first step only since it landed.
+        """
         stance_steps = (leg_phases / self.cycles_per_step).clip(max=1.0)[..., None]
         foot_travel = point_velocities(velocity, state.feet) * self.control_timestep * stance_steps
-        stance_ground = state.feet[..., :2] - foot_travel
-        ground = xp.where(is_stance[..., None], stance_ground, swing_ground)
+        return state.feet[..., :2] - foot_travel
 
+    def _lift_feet(self, leg_phases, gait_size, vertical):
+        """Return the heights (environments, legs) of the soles in the torso's frame, m; see `_next_feet`."""
+        xp = leg_phases.__array_namespace__()
         tilt = tilt_heights(vertical, self.rest_soles)
-        swing_progress = ((leg_phases - duty_factor) / (1.0 - duty_factor)).clip(0.0)
+        swing_progress = ((leg_phases - self.duty_factor) / (1.0 - self.duty_factor)).clip(0.0)
         lift = gait_size * self.parameters.lift * self.mechanics.height * xp.sin(np.pi * swing_progress)
-        heights = self.rest_soles[:, 2] + lift + self.parameters.attitude * tilt
-        return xp.concatenate([ground, heights[..., None]], axis=-1), shifts
+        return self.rest_soles[:, 2] + lift + self.parameters.attitude * tilt
 
     def _find_footholds(self, state: SightedState, velocity, torso_displacement, is_fixed) -> tuple:
         """Return footholds (environments, legs, 2), m from the torso when feet land, and their shifts, m.
