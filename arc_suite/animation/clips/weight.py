@@ -98,7 +98,7 @@ def _weigh_action(body: Body, name: str, draft: Draft, character: Character) -> 
     return draft._replace(weight=0.0)
 
 
-def _plan_action(body: Body, name: str, clip: Acted | Turn, draft: Draft, character: Character) -> np.ndarray | None:
+def _plan_action(body: Body, name: str, clip: Kind, draft: Draft, character: Character) -> np.ndarray | None:
     """Return offsets (samples, 6) of the torso in an action, at full size; None for one without weight."""
     if isinstance(clip, Turn):
         return sink_in_turn(body, draft, character)
