@@ -167,7 +167,7 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "output": ("json", "results", "id"),
     "output_dir": ("output", "results"),
     "path": ("spec", "robot", "file"),
-    "policy": ("run", "algorithm"),
+    "policy": ("run", "policies", "algorithm"),
     "ppo2": ("ppo",),
     "push": ("kicks",),
     "pushes": ("kicks",),
@@ -309,7 +309,7 @@ def _synonyms(word: str) -> tuple[str, ...]:
 def hint(value, valid: Iterable[str]) -> str:
     """Return the part of an error that suggests a valid name; empty if there is none.
 
-    It is a synonym of a value, the same name in other letter case, or the most similar one.
+    It is the same name in other letter case or with one letter more, a synonym of the value, or the most similar name.
     """
     valid_names = list(valid)
     text = preview(value).strip("'")
@@ -319,11 +319,12 @@ def hint(value, valid: Iterable[str]) -> str:
     lower_text = _VERSION.sub("", text).lower()
     synonyms = [synonym for synonym in _synonyms(lower_text) if synonym in valid_names]
     same_letters = [name for name in valid_names if str(name).lower() == lower_text]
+    same_word = difflib.get_close_matches(lower_text, valid_names, n=1, cutoff=_SAME_WORD)
     similar_names = difflib.get_close_matches(text, valid_names, n=1, cutoff=_SIMILAR_WORD)
     if not similar_names:
         similar_names = difflib.get_close_matches(lower_text, valid_names, n=1, cutoff=_SIMILAR_WORD)
     is_known_synonym = lower_text in SYNONYMS
-    suggestions = same_letters or (synonyms if is_known_synonym else []) or similar_names or synonyms
+    suggestions = same_letters or same_word or (synonyms if is_known_synonym else []) or similar_names or synonyms
     return f"; did you mean {suggestions[0]!r}?" if suggestions else ""
 
 

@@ -78,6 +78,8 @@ def shaped(body: Body, **changes: Any) -> Body:
     for name, factor in shape.links.items():
         if name not in body_ends:  # of one leg
             of_one_leg = f"of one leg, as {next(iter(body_ends))}"
+            if name.endswith(tuple(f"_{link}" for link in link_names(body))):  # no link of all legs is meant
+                checks.name(name, body_ends, "link")
             checks.name(name, link_names(body), "link", descriptions=(of_one_leg,))
         link_factors[name] = checks.number(f"links[{name!r}]", factor, *FACTOR_RANGE)
     ends = {checks.name(name, body_ends, "part"): end for name, end in shape.ends.items()}

@@ -13,11 +13,13 @@ CURES = {
     **dict.fromkeys(("deterministic", "stochastic"), "the policy of a run acts by its mean action"),
     **dict.fromkeys(("render", "render_mode"), "arc-suite render films a policy, arc-suite view shows it"),
     "flagfile": "write its flags into the command; arc-suite train --config takes the configuration of a run",
-    "format": "the extension of the output is its format",
     "gravity": "environment.change_model sets it, see docs/environments.md",
+    "list": "--help lists the names that flags take",
     "name": "arc-suite build_model --name NAME --json writes a spec with a name of its own",
     "overwrite": "files are written over; a run goes on in its folder",
 }
+# Those of programs that have --output.
+CURES_OF_OUTPUTS = {"format": "the extension of the output is its format"}
 # Flags whose values a shell changes, unless they are quoted.
 CURES_OF_MISSING_VALUES = {"palette": "a shell drops what follows a #: quote the colors, --palette='#3a5f2b'"}
 
@@ -27,6 +29,9 @@ _TRACKERS = "arc-suite train has --tensorboard and --wandb, for a run of --confi
 _CHECKPOINTS = "a run saves its policy at each evaluation, see --evaluate_every"
 _FILM = "arc-suite render films the policy of a run, arc-suite view shows it"
 _FURTHER = "--algorithm finetune --hp start=RUN trains the policy of a run further"
+_ID = "--id names a dataset; datasets lie in ~/.minari/datasets, or where MINARI_DATASETS_PATH points"
+_FOLDER_OF_RUN = "--output names the folder of the run"
+_TASK_OF_PAGE = "a page has the task of its policy"
 _WANDB = "Weights & Biases reads variables: WANDB_PROJECT, WANDB_ENTITY, WANDB_MODE, next to --wandb"
 _NO_BACKGROUND = "arc-suite animate --transparent writes a picture of a clip without a background"
 CURES_OF_PROGRAMS = {
@@ -34,6 +39,10 @@ CURES_OF_PROGRAMS = {
     "benchmark": dict.fromkeys(("tensorboard", "wandb"), _TRACKERS),
     "build_model": dict.fromkeys(("ballast", "density", "head", "mass", "tail", "torso"), _FORM_OF_BODIES),
     "check": {"fix": "arc-suite studio --spec FILE has a button for the value that fits"},
+    "collect": {
+        **dict.fromkeys(("dataset", "dir", "name", "o", "out", "output", "output_dir", "path", "save"), _ID),
+        "format": "datasets have Minari's format",
+    },
     "completion": {"install": "its output goes into a file; see --help"},
     "design": {
         "spec": "did you mean --around?",
@@ -43,7 +52,11 @@ CURES_OF_PROGRAMS = {
         "t": _COUNT_OF_BODIES,
     },
     "doctor": {"fix": "its lines say what to do"},
-    "play": {"task": "a page has the task of its policy"},
+    "play": {
+        **dict.fromkeys(("set", "task"), _TASK_OF_PAGE),
+        "mode": "the end of the page's address says it, page.html#mode=goals",
+        "open": "a browser shows the page",
+    },
     "render": {
         "background": _NO_BACKGROUND,
         "i": "did you mean --spec or --policy?",
@@ -63,6 +76,7 @@ CURES_OF_PROGRAMS = {
         **dict.fromkeys(
             ("activation", "optimizer"), "networks and optimizers are of the algorithm; see docs/algorithms.md"
         ),
+        **dict.fromkeys(("name", "path"), _FOLDER_OF_RUN),
         "ent_coef": "in its place ppo has --hp initial_std and final_std, sac has --hp target_entropy",
         "vf_coef": "the critic of ppo has a learning rate in its place, --hp value_rate",
         "torch_deterministic": "runs are the same to the last bit on one machine",

@@ -1,16 +1,19 @@
 """Answers to flags that a program does not have, and to arguments that belong into a flag."""
 
+import dataclasses
 import itertools
 import os
+import pkgutil
 import re
 import warnings
-from collections.abc import Sequence
-from typing import NoReturn
+from collections.abc import Mapping, Sequence
+from typing import Any, NoReturn
 
 from absl import flags
 
 from arc_suite import checks, policies, registry
-from arc_suite.cli.flag_cures import CURES, CURES_OF_MISSING_VALUES, CURES_OF_PROGRAMS
+from arc_suite.cli.flag_cures import CURES, CURES_OF_MISSING_VALUES, CURES_OF_OUTPUTS, CURES_OF_PROGRAMS
+from arc_suite.cli.programs import NAMES_OF_FLAGS
 from arc_suite.tasks import TASKS
 
 DASHES = "-\u2013\u2014"  # also those that word processors write in place of two
@@ -30,6 +33,9 @@ _VIEWERS = {
 
 # Names of flags that may mean several of ours: the value says which.
 _VAGUE_NAMES = ("agent", "controller", "file", "filename", "input", "load", "method", "model", "name", "path", "type")
+# What letters mean in many programs of others; no suggestion destroys files.
+_NAMES_OF_LETTERS = {"n": "episodes", "o": "output"}
+_DESTRUCTIVE_FLAGS = ("overwrite",)
 # Flags of which users expect all values, where the last one holds, and the programs that show one creature.
 _FLAGS_OF_ONE = ("robot", "spec")
 _PROGRAMS_OF_ONE = ("animate", "play", "render", "studio", "view")
@@ -57,18 +63,19 @@ def refuse_unknown(
     if cure is not None:
         raise ValueError(f"unknown flag {checks.preview(name)}; {cure}") from None
     value = value or _value_behind(arguments, name)
+    _refuse_value_as_name(name)
+    _refuse_step_of_checkpoint(name, value, arguments, names)
     _refuse_name_of_value(name, value, names)
     if len(name) == 1:
-        long_names = [f"--{long_name}" for long_name in names if long_name[0] == name]
-        if long_names:
-            raise ValueError(f"unknown flag '-{name}'; did you mean {' or '.join(long_names)}?") from None
+        _refuse_letter(name, names)
     _refuse_name_of_argument(name, value, parameters)
     flag_of_value = _flag_that_takes(value) if name in _VAGUE_NAMES else ""
     if flag_of_value:
         cure = f"did you mean --{flag_of_value}={checks.quote(value)}?"
         raise ValueError(f"unknown flag {checks.preview(name)}; {cure}") from None
-    if name in CURES:
-        raise ValueError(f"unknown flag {checks.preview(name)}; {CURES[name]}") from None
+    cures = CURES | (CURES_OF_OUTPUTS if "output" in names else {})
+    if name in cures:
+        raise ValueError(f"unknown flag {checks.preview(name)}; {cures[name]}") from None
     checks.name(name, names, "flag")  # raises a ValueError that suggests a name
 
 
@@ -141,6 +148,33 @@ def refuse_argument(arguments: Sequence[str], positional_arguments: Sequence[str
     raise ValueError(f"unexpected argument {checks.preview(argument)}; {suggestion}see --help")
 
 
+def _refuse_value_as_name(name: str) -> None:
+    """Raise ValueError for a flag that is the name of a policy, a task or the like, such as --ppo."""
+    flag = _flag_that_lists(name)
+    if flag:
+        raise ValueError(f"unknown flag {checks.preview(name)}; did you mean --{flag}={name}?")
+
+
+def _refuse_step_of_checkpoint(name: str, value: str, arguments: Sequence[str], flag_names: Sequence[str]) -> None:
+    """Raise ValueError for the step of a checkpoint in a program that takes the checkpoint's folder as a policy."""
+    if name in ("checkpoint", "ckpt", "step") and value.isdecimal() and "policy" in flag_names:
+        run = next((text.partition("=")[2] for text in arguments if text.startswith("--policy=")), "")
+        run = run or _value_behind(arguments, "policy") or "RUN"
+        raise ValueError(
+            f"unknown flag {checks.preview(name)}; did you mean --policy={checks.quote(run)}/checkpoints/{value}?"
+        )
+
+
+def _refuse_letter(letter: str, flag_names: Sequence[str]) -> None:
+    """Raise ValueError for a letter that is no short name, with the flag that it means, or those that it begins."""
+    meanings = [name for name in checks.meanings(_NAMES_OF_LETTERS.get(letter, letter)) if name in flag_names]
+    harmless_names = [name for name in flag_names if name not in _DESTRUCTIVE_FLAGS]
+    suggestions = meanings[:1] or [name for name in harmless_names if name[0] == letter]
+    if suggestions:
+        long_names = " or ".join(f"--{name}" for name in suggestions)
+        raise ValueError(f"unknown flag '-{letter}'; did you mean {long_names}?")
+
+
 def _refuse_name_of_value(name: str, value: str, flag_names: Sequence[str]) -> None:
     """Raise ValueError for a flag that is the name of a setting or of a hyperparameter, with the flag that takes it."""
     words_of_flags = {
@@ -161,8 +195,22 @@ def _refuse_name_of_value(name: str, value: str, flag_names: Sequence[str]) -> N
 
 
 def hyperparameter_words() -> set[str]:
-    """Return the names of hyperparameters, as the help of --hp lists them; none without that flag."""
-    return set(re.findall(r"\w+", flags.FLAGS["hp"].help)) if "hp" in flags.FLAGS else set()
+    """Return the names of the hyperparameters of all algorithms; none in a program without --hp."""
+    if "hp" not in flags.FLAGS:
+        return set()
+    return {
+        field.name for algorithm in _algorithms().values() for field in dataclasses.fields(algorithm.hyperparameters)
+    }
+
+
+def algorithm_names() -> tuple[str, ...]:
+    """Return the names of all algorithms."""
+    return tuple(_algorithms())
+
+
+def _algorithms() -> Mapping[str, Any]:
+    """Return all algorithms by name; no program of the core imports them before a mistake."""
+    return pkgutil.resolve_name(NAMES_OF_FLAGS["algorithm"])
 
 
 def _refuse_name_of_argument(name: str, value: str, parameters: Sequence[str]) -> None:
@@ -232,6 +280,8 @@ def _join_settings(flag_name: str, values: Sequence[str]) -> str:
     """Return a question for several settings, or for one whose value a shell has split at its spaces; else ""."""
     if all("=" in text for text in values):
         return f"did you mean {' '.join(f'--{flag_name} {text}' for text in values)}? "
+    if len(values) == 2 and not any("=" in text for text in values):
+        return f"did you mean --{flag_name} {'='.join(values)}? "
     setting = " ".join(values)
     name, equals, value = setting.partition("=")
     if equals and _BRACKETS.get(value[:1]) == value[-1:]:
@@ -253,17 +303,31 @@ def _suggest_flag(argument: str) -> str:
 
 
 def _flag_that_takes(value: str) -> str:
-    """Return the name of the flag of the program whose value a text may be; "" for none."""
+    """Return the name of the flag of the program whose value a text may be, a name or a path; "" for none."""
     extension = os.path.splitext(value)[1].lower()
-    flag_takes_value = {
-        "robot": value in registry.robot_words(),
-        "task": value in TASKS,
-        "algorithm": _is_in_help("algorithm", value),
+    flag_takes_path = {
         "spec": extension in (".json", *registry.READERS),
-        "policy": value in policies.POLICIES or os.path.isdir(value) or extension in _POLICY_EXTENSIONS,
+        "policy": os.path.isdir(value) or extension in _POLICY_EXTENSIONS,
         "output": extension != "" and not os.path.exists(value),
     }
-    return next((flag for flag, takes_value in flag_takes_value.items() if takes_value and flag in flags.FLAGS), "")
+    return _flag_that_lists(value) or _first_flag(flag_takes_path)
+
+
+def _flag_that_lists(word: str) -> str:
+    """Return the name of the flag of the program that has a word among its values; "" for none."""
+    flag_has_word = {
+        "robot": word in registry.robot_words(),
+        "task": word in TASKS,
+        "algorithm": _is_in_help("algorithm", word),
+        "policy": word in policies.POLICIES,
+        "preset": word in policies.preset_names(),
+    }
+    return _first_flag(flag_has_word)
+
+
+def _first_flag(is_suitable: Mapping[str, bool]) -> str:
+    """Return the first suitable flag that the program has; "" for none."""
+    return next((flag for flag, suitable in is_suitable.items() if suitable and flag in flags.FLAGS), "")
 
 
 def _is_in_help(flag_name: str, word: str) -> bool:

@@ -3,6 +3,7 @@
 import contextlib
 import json
 import re
+import shlex
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
@@ -13,6 +14,7 @@ from arc_suite import checks, policies, registry
 from arc_suite.arenas import ARENAS
 from arc_suite.bodies import generator, shaping
 from arc_suite.cli import flag_mistakes
+from arc_suite.cpg.selection import check_preset_name
 from arc_suite.envs.setup import Setup
 from arc_suite.models.soundness import flaws
 from arc_suite.policies import other_libraries, zips
@@ -23,6 +25,8 @@ from arc_suite.tasks import TASKS
 FLAGS = flags.FLAGS
 
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+
+_NAME_AND_VALUE = re.compile(r"(\w+)(?:\s*:\s*|\s+)([^\s=].*)")  # with a colon or a space in place of =
 
 _SEVERAL_SETTINGS = re.compile(r"\w+=[^,]*(?:, *[a-z_]+=[^,]*)+")  # such as "mass=1.2,friction=0.5"
 
@@ -144,12 +148,28 @@ def preset_from_flags() -> str | None:
     return FLAGS.preset
 
 
+def check_policy(policy: str, preset: str | None, body: Body) -> None:
+    """Raise an error now for a policy that cannot be read or does not fit a body, or for an unknown preset.
+
+    Raises:
+        ValueError: as `policies.policy`.
+        OSError: as `policies.policy`.
+    """
+    if preset is not None:
+        check_preset_name(preset)
+    if policy != "cpg":  # which takes seconds, and can be made for any body
+        policies.policy(policy, body)
+
+
 def policy_name(name: str) -> str:
     """Return the name of a policy with the statistics of --vecnormalize, if there are any.
 
     Raises:
-        ValueError: --vecnormalize without a zip.
+        ValueError: an algorithm in place of a policy, or --vecnormalize without a zip.
     """
+    if name.isidentifier() and name not in policies.POLICIES and name in flag_mistakes.algorithm_names():
+        cure = f"arc-suite train --algorithm={name} learns a policy, whose name is the folder of the run"
+        raise ValueError(f"policy {name!r}: it is an algorithm; {cure}")
     if FLAGS.vecnormalize is None:
         return name
     policy_file = other_libraries.find(name)
@@ -430,11 +450,7 @@ def named_values(flag: str, texts: Iterable[str]) -> dict[str, Any]:
     for text in texts:
         name, equals, value = text.partition("=")
         if not (name and equals):
-            name_before_colon, colon, value_behind = text.rpartition(":")
-            cure = (
-                f"; did you mean {checks.quote(f'{name_before_colon}={value_behind}')}?" if colon and not equals else ""
-            )
-            raise ValueError(f"--{flag} {checks.quote(text)}: expected name=value{cure}")
+            raise ValueError(f"--{flag} {checks.quote(text)}: expected name=value{_suggest_assignment(flag, text)}")
         _refuse_flag_as_name(flag, name, value)
         mapping, dot, key = name.partition(".")
         if dot and "." not in key and ":" not in name:
@@ -450,6 +466,17 @@ def named_values(flag: str, texts: Iterable[str]) -> dict[str, Any]:
             )
         values[name] = parsed_value
     return values
+
+
+def _suggest_assignment(flag: str, text: str) -> str:
+    """Return the part of an error that suggests name=value for "name: value", "name value" and JSON; else ""."""
+    match = _NAME_AND_VALUE.fullmatch(text)
+    if match is not None:
+        return f"; did you mean {checks.quote(f'{match[1]}={match[2]}')}?"
+    with contextlib.suppress(ValueError, AttributeError):  # no JSON, or no object of it
+        settings = [shlex.quote(f"{name}={json.dumps(value)}") for name, value in json.loads(text).items()]
+        return f"; did you mean {checks.quote(' '.join(f'--{flag} {setting}' for setting in settings))}?"
+    return ""
 
 
 def _refuse_flag_as_name(flag: str, name: str, value: str) -> None:

@@ -51,6 +51,7 @@ def text(run: Configuration, folder: Path) -> str:
     """Return the card of a run in Markdown."""
     robot = run.setup.name
     task = run.setup.kind.name
+    path = _relative_path(folder)
     returns, episodes_text = _read_returns(folder)
     pictures = [f"![{name}]({name})" for name in (PICTURE, "curve.png") if (folder / name).exists()]
     parts = [
@@ -63,8 +64,8 @@ def text(run: Configuration, folder: Path) -> str:
         "## Use",
         _installation_text(folder),
         _code("sh", ["pip install -e '.[animate]'"]),
-        "The commands run in the folder that holds the folder of this card.",
-        _code("sh", next_commands(run.policy_setup, Path(folder.resolve().name), has_pages=False)),
+        f"The commands read the folder of this card as `{path}`.",
+        _code("sh", next_commands(run.policy_setup, path, has_pages=False)),
         "## How it was made",
         _code("sh", [_training_command(run)]),
         "`config.json` has all settings and hyperparameters.",
@@ -73,6 +74,14 @@ def text(run: Configuration, folder: Path) -> str:
         _license_text(run),
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def _relative_path(folder: Path) -> Path:
+    """Return a run's folder as seen from the current folder, or as one of `runs` where it lies elsewhere."""
+    path = folder.resolve()
+    if Path.cwd() in path.parents:
+        return path.relative_to(Path.cwd())
+    return Path("runs") / path.name
 
 
 def _metadata(run: Configuration, mean_return: float) -> str:

@@ -20,12 +20,14 @@ CURED = {
     "play --robot tick -o tick": "tick: expected a name that ends in .html\n",
     "animate --robot tick -o clips": "clips: expected a name that ends in .glb, ",
 }
+LEARNER = "it is an algorithm; arc-suite train --algorithm="
+RUN = "learns a policy, whose name is the folder of the run\n"
 OTHERS = {
     "evaluate --robot Tick": f"unknown robot 'Tick'; did you mean 'tick'? {ROBOTS}",
     "evaluate --robots tick": "unknown flag 'robots'; did you mean 'robot'?",
     "evaluate --robot=tick --task=Walk": "unknown task 'Walk'; did you mean 'walk'?",
     "evaluate --robot=tick --task=walking": "unknown task 'walking'; did you mean 'walk'?",
-    "evaluate --robot=tick --policy=sac": "unknown policy 'sac' (there are: cpg, zero, random, ppo, universal)\n",
+    "evaluate --robot=tick --policy=sac": f"policy 'sac': {LEARNER}sac {RUN}",
     "evaluate --robot=tick --set kicks": "--set kicks: expected name=value\n",
     "evaluate --robot=tick --set kick=1.5": "unknown setting of walk 'kick'; did you mean 'kicks'?",
     "evaluate --robot=tick --set=kicks=high": "kicks: expected a number from 0 to 100, got 'high'",
@@ -232,7 +234,6 @@ FIRST_HOUR = {
     "view page.html": "unexpected argument 'page.html'; a browser shows a page; see --help\n",
     "render tick.mp4": "unexpected argument 'tick.mp4'; did you mean --output=tick.mp4? see --help\n",
     "render folder": "unexpected argument 'folder'; did you mean --policy=folder? see --help\n",
-    "collect --policy=cpg --output=data": "unknown flag 'output'; did you mean 'id'? (there are: arena, author, ",
     "train --policy=ppo": "unknown flag 'policy'; did you mean 'algorithm'? (there are: algorithm, arena, ",
     "train --hp steps=100": "--hp steps=100: it is a flag; did you mean --steps=100?\n",
     "train --algorithm=dagger --hp num_envs=9999999": "num_envs: expected an integer from 2 to 1048576, got 9999999",
@@ -254,10 +255,53 @@ FIRST_HOUR = {
     "tick": "arc-suite: tick: expected a program first, such as arc-suite evaluate --robot=tick\n",
     "walk": "arc-suite: walk: expected a program first, such as arc-suite evaluate --task=walk\n",
 }
-LINES = CURED | OTHERS | MISPLACED | FIRST_HOUR
+DATASETS = "--id names a dataset; datasets lie in ~/.minari/datasets, or where MINARI_DATASETS_PATH points\n"
+NO_TASK = "a page has the task of its policy\n"
+FRICTION = "did you mean --set friction=0.5?"
+# What once was answered by a wrong cure.
+WRONG_CURES = {
+    "train --robot=tick --ppo": "unknown flag 'ppo'; did you mean --algorithm=ppo?\n",
+    "evaluate --ppo": "unknown flag 'ppo'; did you mean --policy=ppo?\n",
+    "evaluate --walk": "unknown flag 'walk'; did you mean --task=walk?\n",
+    "evaluate --steered": "unknown flag 'steered'; did you mean --preset=steered?\n",
+    "train --name mine": "unknown flag 'name'; --output names the folder of the run\n",
+    "train --path runs/x": "unknown flag 'path'; --output names the folder of the run\n",
+    "train --value 3": "unknown flag 'value' (there are: algorithm, ",
+    "collect --robot tick -o data": f"unknown flag 'o'; {DATASETS}",
+    "collect --policy=cpg --output=data": f"unknown flag 'output'; {DATASETS}",
+    "collect --path data": f"unknown flag 'path'; {DATASETS}",
+    "collect -n 5": "unknown flag '-n'; did you mean --episodes?\n",
+    "collect --format hdf5": "unknown flag 'format'; datasets have Minari's format\n",
+    "evaluate -o a.json": "unknown flag '-o'; did you mean --json?\n",
+    "play --robot walker -o a.html": "unknown robot 'walker'; did you mean 'walkers'? (there are: ",
+    "play --set target_velocity=1": f"unknown flag 'set'; {NO_TASK}",
+    "play --mode goals": "unknown flag 'mode'; the end of the page's address says it, page.html#mode=goals\n",
+    "play --open": "unknown flag 'open'; a browser shows the page\n",
+    "animate --list": "unknown flag 'list'; --help lists the names that flags take\n",
+    "transfer --families all": "--families=all: without the flag, all families play\n",
+    "benchmark samples --policy ppo": "unknown flag 'policy'; did you mean 'policies'? (there are: ",
+    "evaluate --checkpoint 9 --policy RUN": "unknown flag 'checkpoint'; did you mean --policy=RUN/checkpoints/9?\n",
+    'evaluate --set {"friction":0.5}': f'--set {{"friction":0.5}}: expected name=value; {FRICTION}\n',
+    "evaluate --set friction 0.5": f"unexpected argument '0.5'; {FRICTION} see --help\n",
+    "play --robot=tick --policy dagger -o a.html": f"policy 'dagger': {LEARNER}dagger {RUN}",
+    "play --spec spidr -o a.html": "unknown robot 'spidr'; did you mean 'spider'? (there are: ",
+    "play --robot=tick --policy runs/none -o a.html": "cannot read runs/none: no such file\n",
+    "play --legs 6 --robot=tick -o a.html": "--robot=tick: expected no robot with --spec or --legs\n",
+    "play --robot=tick --arena a.png:9x9x1 -o a.html": "cannot read a.png: no such file or directory",
+    "studio --policy runs/none": "cannot read runs/none: no such file\n",
+    "transfer --policy ppo": "policy ppo: expected universal, or the folder of a run of many bodies\n",
+    "export cpg": "policy cpg: expected the folder of a run, or universal with a body\n",
+    "evaluate --policy tick-walk-ppo-0": "unknown policy 'tick-walk-ppo-0'; did you mean runs/tick-walk-ppo-0?\n",
+    "card tick-walk-ppo-0": "tick-walk-ppo-0: no folder of a run; did you mean runs/tick-walk-ppo-0?\n",
+    "card runs/tick-walk-ppo": "runs/tick-walk-ppo: no folder of a run; did you mean runs/tick-walk-ppo-0?\n",
+    "build_model --spec=spider --length l9_lower=2": "unknown link 'l9_lower'; did you mean 'l4_lower'? (there are: ",
+}
+LINES = CURED | OTHERS | MISPLACED | FIRST_HOUR | WRONG_CURES
 
 
-@pytest.mark.parametrize("command", tiers(LINES, CURED.__contains__, list(FIRST_HOUR)[::3].__contains__))
+@pytest.mark.parametrize(
+    "command", tiers(LINES, CURED.__contains__, [*WRONG_CURES, *list(FIRST_HOUR)[::3]].__contains__)
+)
 def test_a_mistake_is_one_line(command, tmp_path):
     (tmp_path / "note.txt").write_text("hello")
     (tmp_path / "body.json").write_text('{"name": "x"}')
@@ -273,9 +317,10 @@ def test_a_mistake_is_one_line(command, tmp_path):
     (tmp_path / "gallery" / "bodies").mkdir(parents=True)
     (tmp_path / "gallery" / "bodies" / "a.json").touch()
     (tmp_path / "gallery" / "design.json").write_text('{"elites": []}')
-    (tmp_path / "runs" / "tick").mkdir(parents=True)
-    for name in ("config.json", "policy.npz"):
-        (tmp_path / "runs" / "tick" / name).write_text("{}")
+    for run in ("tick", "tick-walk-ppo-0"):
+        (tmp_path / "runs" / run).mkdir(parents=True)
+        for name in ("config.json", "policy.npz"):
+            (tmp_path / "runs" / run / name).write_text("{}")
     np.savez(tmp_path / "arrays.npz", zeros=np.zeros(3))
     np.save(tmp_path / "array.npy", np.zeros(3))
     files = sorted(tmp_path.iterdir())

@@ -48,7 +48,7 @@ def test_a_card_says_what_a_hub_and_a_reader_want(run, folder, monkeypatch):
     assert "| steps | 20 of 20 |" in card and '| settings | `{"time_limit": 0.25}` |' in card
     assert re.search(r"\| score \| -?\d\.\d\d, 95 % interval \[", card)
     assert (
-        f"arc-suite evaluate --policy {folder.name}\n" in card
+        f"arc-suite evaluate --policy runs/{folder.name}\n" in card
         and str(folder) not in card
         and f"\n{run.command}\n" in card
     )

@@ -17,12 +17,13 @@ keeps walking, and left and right turn its course.
 
 from absl import flags
 
-from arc_suite import files
+from arc_suite import files, registry
 from arc_suite.animation import pages, play_pages
 from arc_suite.cli import outputs
 from arc_suite.cli.flags import (
     adjust_body,
     bodies_from_flags,
+    check_policy,
     choose_bodies,
     custom_body,
     define_arena,
@@ -52,12 +53,15 @@ def main() -> None:
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.html")
     outputs.check_extension(FLAGS.output, [".html"])
-    pages.read_built_file("play.js")  # raises an error now if there is none
     import_modules()
     bodies = _bodies_from_flags()  # this imports the modules that flags name
     bodies = choose_bodies(policy_setup(importing_flags="--modules"), bodies)
     policy = policy_name(FLAGS.policy)
     preset = preset_from_flags()
+    check_policy(policy, preset, next(iter(bodies.values())))
+    if FLAGS.arena is not None:
+        registry.arena_maker(FLAGS.arena)  # raises an error now if it has no ground
+    pages.read_built_file("play.js")  # raises an error now if there is none
     with files.writing(FLAGS.output) as temporary:
         creatures = []
         for body in progress(bodies.values(), "fitting", leave=False):

@@ -21,8 +21,15 @@ from arc_suite import checks, versions
 from arc_suite.animation.studio.session import Session
 from arc_suite.animation.studio.sketch import DEFAULT_CHOICE, Sketch, open_body, sources
 from arc_suite.arenas import ground_text
-from arc_suite.cli.flags import define_walk, named_values, only_setup, policy_name, preset_from_flags, task_from_flags
-from arc_suite.cpg.selection import check_preset_name
+from arc_suite.cli.flags import (
+    check_policy,
+    define_walk,
+    named_values,
+    only_setup,
+    policy_name,
+    preset_from_flags,
+    task_from_flags,
+)
 
 FLAGS = flags.FLAGS
 define_walk()
@@ -39,9 +46,10 @@ _PORT_ALONE = re.compile(r"[1-9]\d{1,4}")
 def main() -> None:
     """Open the page and step until Ctrl-C."""
     _check_host(FLAGS.host)
+    sketch = _sketch_from_flags()
     with versions.require_extra("the studio needs viser", "animate"):
         from arc_suite.animation.studio.page import serve
-    serve(Session(_sketch_from_flags()), FLAGS.host, FLAGS.port, _print_address)
+    serve(Session(sketch), FLAGS.host, FLAGS.port, _print_address)
 
 
 def _check_host(text: str) -> None:
@@ -68,9 +76,9 @@ def _print_address(url: str) -> None:
 def _sketch_from_flags() -> Sketch:
     """Return the sketch of the body, task and policy that flags name."""
     setup = only_setup()
+    policy = policy_name(FLAGS.policy)
     preset = preset_from_flags()
-    if preset is not None:
-        check_preset_name(preset)
+    check_policy(policy, preset, setup.body)
     settings = setup.task_kwargs
     ground = settings.pop("arena", "flat")
     ground_file = ""
@@ -78,7 +86,6 @@ def _sketch_from_flags() -> Sketch:
         ground_file = ground
         ground = task_from_flags()[1]["arena"]  # the file
     kicks = settings.pop("kicks", 0.0)
-    policy = policy_name(FLAGS.policy)
     has_default_task = policy == "cpg" and not FLAGS["task"].present
     sketch = Sketch(
         task=Sketch.task if has_default_task else setup.task,

@@ -141,7 +141,13 @@ def open_run(
 
 
 def _suggest_run(path: Path) -> str:
-    """Return the part of an error that suggests the run which a file is of, or one that a folder has; "" for none."""
+    """Return the part of an error that suggests a run: that of a file, one in a folder, or one of a similar name.
+
+    It is "" for none.
+    """
+    if not path.exists():
+        path_in_runs = Path("runs") / path
+        return f"; did you mean {path_in_runs}?" if (path_in_runs / CONFIG).exists() else files.suggest_path(path)
     configs = [path.parent / CONFIG] if path.is_file() else sorted(path.glob(f"*/{CONFIG}"))
     runs = [config.parent for config in configs if config.exists()]
     return f"; did you mean {runs[0]}?" if runs else ""

@@ -57,6 +57,8 @@ def main(run: str | None = None) -> None:
     """Write the file, and print what it is."""
     if run is None:
         raise ValueError("expected the folder of a run, a policy file or a zip of stable-baselines3; see --help")
+    if run in policies.POLICIES and run != universal.NAME:
+        raise ValueError(f"policy {run}: expected the folder of a run, or universal with a body")
     path = Path(run)
     name = policy_name(run)
     folder = path if path.is_dir() else path.parent

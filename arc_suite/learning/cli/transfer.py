@@ -35,9 +35,13 @@ flags.DEFINE_string("name", None, "Of the policy in this table. [default: the st
 def main() -> None:
     """Play, print the table and write the episodes."""
     task, settings = task_from_flags()  # first: this imports the modules that flags name
+    if FLAGS.policy in policies.POLICIES and FLAGS.policy != universal.NAME:
+        raise ValueError(f"policy {FLAGS.policy}: expected universal, or the folder of a run of many bodies")
     with hint_import("--task or --set"):
         trained = policies.setup_of(FLAGS.policy)
     task, settings = complete_task(trained, task, settings)
+    if FLAGS.families == ["all"]:
+        raise ValueError("--families=all: without the flag, all families play")
     for family in FLAGS.families:
         checks.name(family, transfer.FAMILIES, "family")
     if FLAGS.output:
