@@ -31,28 +31,50 @@ _FILM = "arc-suite render films the policy of a run, arc-suite view shows it"
 _FURTHER = "--algorithm finetune --hp start=RUN trains the policy of a run further"
 _ID = "--id names a dataset; datasets lie in ~/.minari/datasets, or where MINARI_DATASETS_PATH points"
 _FOLDER_OF_RUN = "--output names the folder of the run"
+_LENGTHS = "--length NAME=FACTOR stretches links, and arc-suite build_model --scale all lengths"
+_FILES_OF_PAGE = "buttons of the page save files"
+_CARD = "the card is README.md in the folder of the run"
+_CLIPS = "arc-suite animate writes clips, with --clips, --weight and --size"
 _TASK_OF_PAGE = "a page has the task of its policy"
 _WANDB = "Weights & Biases reads variables: WANDB_PROJECT, WANDB_ENTITY, WANDB_MODE, next to --wandb"
 _NO_BACKGROUND = "arc-suite animate --transparent writes a picture of a clip without a background"
 CURES_OF_PROGRAMS = {
-    "animate": {"frames": "a clip lasts a whole cycle; --fps sets its pictures"},
-    "benchmark": dict.fromkeys(("tensorboard", "wandb"), _TRACKERS),
+    "animate": {
+        "frames": "a clip lasts a whole cycle; --fps sets its pictures",
+        "loop": "clips of a gait are loops",
+        "scale": _LENGTHS,
+    },
+    "benchmark": {
+        **dict.fromkeys(("tensorboard", "wandb"), _TRACKERS),
+        "robot": "--places takes robots with their tasks, such as tick-walk",
+    },
     "build_model": dict.fromkeys(("ballast", "density", "head", "mass", "tail", "torso"), _FORM_OF_BODIES),
+    "card": dict.fromkeys(("o", "output"), _CARD),
     "check": {"fix": "arc-suite studio --spec FILE has a button for the value that fits"},
     "collect": {
         **dict.fromkeys(("dataset", "dir", "name", "o", "out", "output", "output_dir", "path", "save"), _ID),
         "format": "datasets have Minari's format",
     },
-    "completion": {"install": "its output goes into a file; see --help"},
+    "completion": {
+        **dict.fromkeys(("o", "output"), "its output goes into a file by > FILE"),
+        "install": "its output goes into a file; see --help",
+    },
     "design": {
         "spec": "did you mean --around?",
+        "robot": "did you mean --around?",
         "legs": "the search chooses legs; --around keeps those of a creature",
         "minutes": _COUNT_OF_BODIES,
         "n": _COUNT_OF_BODIES,
         "t": _COUNT_OF_BODIES,
     },
     "doctor": {"fix": "its lines say what to do"},
+    "evaluate": {
+        "home": "arc-suite import has --home",
+        "scale": _LENGTHS,
+        "seeds": "--episodes counts on from --seed: --seed=0 --episodes=10 are seeds 0 to 9",
+    },
     "play": {
+        **dict.fromkeys(("clips", "size", "weight"), _CLIPS),
         **dict.fromkeys(("set", "task"), _TASK_OF_PAGE),
         "mode": "the end of the page's address says it, page.html#mode=goals",
         "open": "a browser shows the page",
@@ -66,12 +88,16 @@ CURES_OF_PROGRAMS = {
         "transparent": _NO_BACKGROUND,
         "y": "files are written over",
     },
-    "study": dict.fromkeys(("tensorboard", "wandb"), _TRACKERS),
+    "studio": dict.fromkeys(("o", "output"), _FILES_OF_PAGE),
+    "study": {
+        **dict.fromkeys(("tensorboard", "wandb"), _TRACKERS),
+        "seeds": "a study has its seeds; arc-suite benchmark has --seeds",
+    },
     "train": {
         **dict.fromkeys(("checkpoint_every", "checkpoint_freq", "save_every", "save_freq"), _CHECKPOINTS),
         **dict.fromkeys(("save_interval", "save_model"), _CHECKPOINTS),
         **dict.fromkeys(("capture_video", "play", "record_video", "render", "video", "view", "watch"), _FILM),
-        **dict.fromkeys(("checkpoint", "ckpt", "load", "load_run", "load_model", "pretrained"), _FURTHER),
+        **dict.fromkeys(("checkpoint", "ckpt", "from", "load", "load_run", "load_model", "pretrained"), _FURTHER),
         **dict.fromkeys(("wandb_entity", "wandb_mode", "wandb_name", "wandb_project"), _WANDB),
         **dict.fromkeys(
             ("activation", "optimizer"), "networks and optimizers are of the algorithm; see docs/algorithms.md"
@@ -81,4 +107,6 @@ CURES_OF_PROGRAMS = {
         "vf_coef": "the critic of ppo has a learning rate in its place, --hp value_rate",
         "torch_deterministic": "runs are the same to the last bit on one machine",
     },
+    "transfer": dict.fromkeys(("robot", "spec"), "arc-suite evaluate --policy RUN --spec FILE plays one body"),
+    "view": dict.fromkeys(("o", "output"), "arc-suite render writes pictures, films and pages"),
 }

@@ -20,6 +20,8 @@ DASHES = "-\u2013\u2014"  # also those that word processors write in place of tw
 
 _FLAG = re.compile(r"--?([a-z_]+)(?:=.*)?", re.DOTALL)
 _BARE_KEY = re.compile(r"([{,]\s*)([a-z_]\w*)(\s*:)")  # a name in braces, without its quotes
+_MISSING_VALUE = re.compile(r"Missing value for flag (\S+)")  # words of absl
+_DATASET_ID = re.compile(r"[\w.-]+(?:/[\w.-]+)+-v\d+")
 _BRACKETS = {"{": "}", "[": "]"}
 
 _POLICY_EXTENSIONS = (".npz", ".zip")
@@ -96,10 +98,11 @@ def refuse_value(error: flags.IllegalFlagValueError) -> None:
 
 
 def refuse_missing_value(error: flags.Error) -> None:
-    """Raise ValueError for a flag without its value, if a shell drops such values; `error` is that of absl."""
-    name = str(error).rpartition("-")[2]
-    if name in CURES_OF_MISSING_VALUES:
-        raise ValueError(f"{error}; {CURES_OF_MISSING_VALUES[name]}") from None
+    """Raise ValueError for a flag without its value; `error` is that of absl."""
+    match = _MISSING_VALUE.match(str(error))
+    if match is not None:
+        cure = CURES_OF_MISSING_VALUES.get(match[1].lstrip("-"))
+        raise ValueError(f"{match[1]}: expected a value, got none{f'; {cure}' if cure else ''}") from None
 
 
 def refuse_flag_as_value(flag: flags.Flag) -> None:
@@ -308,6 +311,7 @@ def _flag_that_takes(value: str) -> str:
     flag_takes_path = {
         "spec": extension in (".json", *registry.READERS),
         "policy": os.path.isdir(value) or extension in _POLICY_EXTENSIONS,
+        "verify": _DATASET_ID.fullmatch(value) is not None,
         "output": extension != "" and not os.path.exists(value),
     }
     return _flag_that_lists(value) or _first_flag(flag_takes_path)

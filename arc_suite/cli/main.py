@@ -4,10 +4,19 @@ import importlib
 import sys
 from collections.abc import Sequence
 from types import ModuleType
+from typing import NoReturn
 
 from arc_suite import checks, registry, versions
 from arc_suite.cli import interrupts, program
-from arc_suite.cli.programs import FORMER_PROGRAMS, PROGRAMS, WORDS, docstring_of, installed_programs, usage
+from arc_suite.cli.programs import (
+    CURES_OF_WORDS,
+    FORMER_PROGRAMS,
+    PROGRAMS,
+    WORDS,
+    docstring_of,
+    installed_programs,
+    usage,
+)
 from arc_suite.cli.version import describe_suite
 
 _HELP_WORDS = ("help", "--help", "-h")
@@ -24,7 +33,9 @@ def main(*arguments: str) -> None:
     sys.path.append("")
     program_name, *program_arguments = [*arguments, *sys.argv[1:]] or ["help"]
     if program_name in _HELP_WORDS and program_arguments:  # as in `arc-suite help train`
-        program_name, *_ = program_arguments
+        program_name, *further_words = program_arguments
+        if further_words:
+            program.guard(lambda: _refuse_word(further_words[0]), "arc-suite")
         program_arguments = ["--help"]
     # `guard` and `run` exit the process.
     if program_name in ("version", "--version", "-V"):
@@ -36,6 +47,11 @@ def main(*arguments: str) -> None:
     else:
         module = _program_of_another_package(program_name)
     program.run(module.main, f"arc-suite {program_name}", program_arguments)
+
+
+def _refuse_word(word: str) -> NoReturn:
+    """Raise ValueError for a word behind the program of arc-suite help."""
+    raise ValueError(f"unexpected argument {checks.preview(word)}; help takes one program")
 
 
 def _print_version(arguments: Sequence[str]) -> None:
@@ -70,6 +86,8 @@ def _program_of_another_package(name: str) -> ModuleType:
             full_name = f"{entry_points[name].module}:{name}"
         elif ":" in name:
             full_name = name
+        elif name in CURES_OF_WORDS:
+            raise ValueError(f"unknown program {name!r}; {CURES_OF_WORDS[name]}")
         else:
             full_name = checks.name(name, [*PROGRAMS, *entry_points, *WORDS], "program")
         module = registry.find("program", full_name, PROGRAMS)

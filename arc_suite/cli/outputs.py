@@ -19,6 +19,7 @@ _PROGRAM_OF_EXTENSION = {
     ".onnx": "arc-suite export writes .onnx",
     ".png": _PICTURES,
     ".stl": _MESH,
+    ".urdf": "the suite writes bodies as MJCF",
     ".webp": _PICTURES,
     ".xml": "arc-suite build_model writes .xml",
 }

@@ -191,9 +191,8 @@ def _parse(arguments: Sequence[str], module: ModuleType, parameters: Sequence[st
         parameters: names of the arguments that are no flags; errors suggest them.
 
     Raises:
-        ValueError: a flag that the program does not have, a value that its flag does not take, an empty one, or another
-            flag in place of a value.
-        flags.Error: a flag without its value.
+        ValueError: a flag that the program does not have, a value that its flag does not take, none, or another flag in
+            place of a value.
     """
     with_underscores = [_FLAG_NAME.sub(lambda match: match[0].replace("-", "_"), text) for text in arguments]
     program_flags = list(_flags_of(module))

@@ -54,6 +54,23 @@ FORMER_PROGRAMS = {
     "enter": "the leaderboard is made of committed studies, by python tools/study.py NAME --report in a clone",
 }
 
+# What to run where a word is no program.
+CURES_OF_WORDS = {
+    "build": "did you mean build_model?",
+    "convert": "did you mean export, of a policy, or import, of a robot?",
+    "dataset": "did you mean collect?",
+    "datasets": "did you mean collect?",
+    "demo": "did you mean play or studio?",
+    "gui": "did you mean play or studio?",
+    "leaderboard": "did you mean benchmark?",
+    "learn": "did you mean train?",
+    **dict.fromkeys(("list", "robots", "tasks"), "arc-suite evaluate --help lists robots and tasks"),
+    "run": "did you mean train?",
+    "simulate": "did you mean view or render?",
+    "test": "did you mean doctor or check?",
+    "video": "did you mean render?",
+}
+
 _USAGE = """\
 arc-suite PROGRAM [flags]
 

@@ -67,6 +67,8 @@ def read_arrays(
         if _NAMES_ARRAY in arrays:
             names = tuple([str(name) for name in arrays[_NAMES_ARRAY].ravel()])
         if _ANGLES_ARRAY not in arrays:
+            if "policy" in arrays:
+                raise ValueError("expected a motion, got a policy, which arc-suite render and arc-suite view show")
             raise ValueError(f"expected a motion, or arrays as mjlab has them, and there is no {_ANGLES_ARRAY}")
         angles = _numbers(arrays, _ANGLES_ARRAY, 2)
         if angles.shape[1] != len(names):

@@ -50,7 +50,9 @@ def main() -> None:
     else:
         refuse_flags(["name"], "goes with --output")
     # A policy of many bodies is the same in the task of any body; Queen's stands for all.
-    network = universal.load(FLAGS.policy, Setup.of("queen", task, settings).definition)
+    definition = Setup.of("queen", task, settings).definition
+    network = universal.load(FLAGS.policy, definition)
+    universal.Universal(network, definition)  # raises an error now for a task in which it cannot act
     print(f"{'family':<10}" + "".join(f"{head:>13}" for head in transfer.TransferResult._fields))
     comparisons_by_family = {}
     for family in FLAGS.families:
