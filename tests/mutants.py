@@ -60,7 +60,7 @@ MUTANTS = {
     "divergence unseen": "return simulations.warning[..., 1].any(axis=-1)«→ & False»",
     "fork unnoticed": "    global count\n    count += «1→0»\n",
     "batch destroyed in a forked child": "«        forks.keep(self._simulations)\n→»",
-    "picture of another moment": "«        decorated.pose(qpos, share, mocap_pos, markers, failed_legs)\n→»",
+    "picture of another moment": "«        decorated.pose(qpos, share, mocap_pos, markers, failed_legs, swings)\n→»",
     "user's choice of OpenGL overwritten": '«"MUJOCO_GL" not in os.environ and →»',
     # Tasks.
     "dropped clip of the contact forces": "forces.reshape(forces.shape[:-2] + (-1,))«.clip(-1.0, 1.0)→»,",
@@ -108,7 +108,7 @@ MUTANTS = {
     # Environments.
     "dropped clip of the action": "return array«.clip(-1.0, 1.0)→»",
     "NaN let through": "is_finite = np.«isfinite(array→ones(array.shape, bool»)",
-    "ignored seed": "return np.random.RandomState(«valid_seed→»)",
+    "ignored seed": "np.random.RandomState(«valid_seed→»), valid_seed)",
     "fall reported as a time limit": "if terminated:\n            return «0.0→1.0»",
     "a new stream carries on the old one": "self._stream_begins = «True→False»  # with the next episode",
     "a new stream of an environment carries on the old one": "self._streams_begin[index] = «True→False»",
