@@ -64,7 +64,7 @@ def blocks(text: str) -> Iterator[Block]:
 
 def commands(text: str) -> list[str]:
     """Return the programs that a text runs, in blocks and in sentences, each in one line."""
-    return [" ".join(command.split()) for command in _COMMAND.findall(text)]
+    return [" ".join(command.split()) for command in _COMMAND.findall(text.replace("\\\n", " "))]
 
 
 def shorten(command: str) -> str:
