@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import os
 import re
 import shlex
 import warnings
@@ -167,7 +168,8 @@ def policy_name(name: str) -> str:
     Raises:
         ValueError: an algorithm in place of a policy, or --vecnormalize without a zip.
     """
-    if name.isidentifier() and name not in policies.POLICIES and name in flag_mistakes.algorithm_names():
+    is_word = name.isidentifier() and name not in policies.POLICIES and not os.path.exists(name)
+    if is_word and name in flag_mistakes.algorithm_names():
         cure = f"arc-suite train --algorithm={name} learns a policy, whose name is the folder of the run"
         raise ValueError(f"policy {name!r}: it is an algorithm; {cure}")
     if FLAGS.vecnormalize is None:

@@ -2,12 +2,14 @@
 
 import importlib.metadata
 import json
+import pathlib
 import re
 
 import programs
 import pytest
 from returns import RETURNS
 
+from arc_suite import policies
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
 from arc_suite.robots import ROBOTS
@@ -170,3 +172,12 @@ def test_the_return_of_standing_still_is_that_of_the_first_ten_episodes(tmp_path
     evaluated("--robot=tick", "--policy=zero", "--episodes=11", "--set=time_limit=0.5", f"--json={path}")
     report = json.loads(path.read_text())["robots"]["tick"]
     assert report["zero_return"] == pytest.approx(sum(each["total"] for each in report["episodes"][:10]) / 10)
+
+
+@pytest.mark.slow
+def test_a_folder_may_have_the_name_of_an_algorithm(tmp_path):
+    (tmp_path / "sac").mkdir()
+    packaged = pathlib.Path(policies.__file__).parent / "packaged" / "tick-walk.npz"
+    (tmp_path / "sac" / "policy.npz").write_bytes(packaged.read_bytes())
+    done = programs.arc_suite("evaluate", "--robot=tick", "--policy=sac", "--episodes=1", cwd=tmp_path)
+    assert programs.passed(done)
