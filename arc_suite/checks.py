@@ -309,7 +309,7 @@ def _synonyms(word: str) -> tuple[str, ...]:
 def hint(value, valid: Iterable[str]) -> str:
     """Return the part of an error that suggests a valid name; empty if there is none.
 
-    It is the same name in other letter case or with one letter more, a synonym of the value, or the most similar name.
+    It is the same name in other letter case, one that is almost the same, a synonym of the value, or a similar one.
     """
     valid_names = list(valid)
     text = preview(value).strip("'")

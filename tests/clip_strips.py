@@ -17,7 +17,6 @@ from PIL import Image, ImageDraw
 
 from arc_suite.animation.clips import clips
 from arc_suite.envs.setup import Setup
-from arc_suite.motions.ground_poses import compose
 from arc_suite.simulation import opengl, pictures
 
 BODIES = ("queen", "random:0")
@@ -30,27 +29,14 @@ SEED = 70
 FREE_CAMERA = -1
 
 
-def list_poses(clip) -> tuple[list[np.ndarray], list[float]]:
-    """Return poses (nq,) of a clip in the world, one for each picture of a strip, and their times, s."""
+def list_poses(clip) -> tuple[np.ndarray, np.ndarray]:
+    """Return poses (pictures, nq) of a clip in the world, and their times (pictures,), s."""
     motion = clip.motion
     repeats = max(2, math.ceil(1.0 / motion.seconds)) if clip.loops else 1
-    times = np.linspace(0.0, repeats * motion.seconds, ROWS * COLUMNS)
-    poses = []
-    for time in times:
-        lap = min(int(time / motion.seconds), repeats - 1)
-        sample = round((time - lap * motion.seconds) / motion.time_step)
-        start = np.zeros(3)
-        for _ in range(lap):
-            start = compose(start, motion.root[-1])
-        moved_root = compose(start, motion.root[[sample]])
-        still = motion._replace(
-            root=moved_root,
-            positions=motion.positions[[sample]],
-            quaternions=motion.quaternions[[sample]],
-            joints=motion.joints[[sample]],
-        )
-        poses.append(still.poses()[0])
-    return poses, list(times)
+    for _ in range(repeats - 1):
+        motion = motion.append(clip.motion)
+    samples = np.linspace(0, len(motion.joints) - 1, ROWS * COLUMNS).round().astype(int)
+    return motion.poses()[samples], samples * motion.time_step
 
 
 def watch_all(model, body, poses: np.ndarray) -> None:
@@ -67,7 +53,7 @@ def draw_strip(body, clip) -> Image.Image:
     """Return the strip of a clip: pictures in rows, with the time in the corner of each."""
     drawing = pictures.Decorated.from_body(body, quality=pictures.QUALITIES["film"])
     poses, times = list_poses(clip)
-    watch_all(drawing.model.ptr, body, np.array(poses))
+    watch_all(drawing.model.ptr, body, poses)
     strip = Image.new("RGB", (COLUMNS * SIZE[0], ROWS * SIZE[1]))
     for index, (pose, time) in enumerate(zip(poses, times, strict=True)):
         drawing.pose(pose)

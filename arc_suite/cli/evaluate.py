@@ -19,6 +19,7 @@ from pathlib import Path
 from absl import flags
 
 from arc_suite import checks, evaluation, files, seed_ranges, versions
+from arc_suite.cli import outputs
 from arc_suite.cli.flags import MAX_COUNT, define_walk, policy_name, preset_from_flags, setups_from_flags
 from arc_suite.cli.program import progress
 from arc_suite.cli.summary import transport_footnote
@@ -36,7 +37,7 @@ flags.DEFINE_string("json", None, "File to write the metrics to, as JSON, with e
 def main() -> None:
     """Print the table and write the JSON."""
     if FLAGS.json is not None and Path(FLAGS.json).suffix:
-        checks.extension(FLAGS.json, [".json"])
+        outputs.check_extension(FLAGS.json, [".json"])
     files.check_target(FLAGS.json)
     setups = setups_from_flags()
     checks.seed(FLAGS.seed + FLAGS.episodes - 1)

@@ -64,7 +64,7 @@ def refuse_unknown(
     cure = CURES_OF_PROGRAMS.get(program, {}).get(name)
     if cure is not None:
         raise ValueError(f"unknown flag {checks.preview(name)}; {cure}") from None
-    value = value or _value_behind(arguments, name)
+    value = value or _value_of(arguments, name)
     _refuse_value_as_name(name)
     _refuse_step_of_checkpoint(name, value, arguments, names)
     _refuse_name_of_value(name, value, names)
@@ -161,8 +161,7 @@ def _refuse_value_as_name(name: str) -> None:
 def _refuse_step_of_checkpoint(name: str, value: str, arguments: Sequence[str], flag_names: Sequence[str]) -> None:
     """Raise ValueError for the step of a checkpoint in a program that takes the checkpoint's folder as a policy."""
     if name in ("checkpoint", "ckpt", "step") and value.isdecimal() and "policy" in flag_names:
-        run = next((text.partition("=")[2] for text in arguments if text.startswith("--policy=")), "")
-        run = run or _value_behind(arguments, "policy") or "RUN"
+        run = _value_of(arguments, "policy") or "RUN"
         raise ValueError(
             f"unknown flag {checks.preview(name)}; did you mean --policy={checks.quote(run)}/checkpoints/{value}?"
         )
@@ -226,9 +225,11 @@ def _refuse_name_of_argument(name: str, value: str, parameters: Sequence[str]) -
             )
 
 
-def _value_behind(arguments: Sequence[str], name: str) -> str:
-    """Return the argument behind a flag, which may be its value; "" if there is none, or another flag."""
-    for flag, value in itertools.pairwise(arguments):
+def _value_of(arguments: Sequence[str], name: str) -> str:
+    """Return what may be the value of a flag: the text behind its =, or the next argument if it is no flag; else ""."""
+    for flag, value in itertools.pairwise([*arguments, ""]):
+        if flag.startswith(f"--{name}="):
+            return flag.partition("=")[2]
         if flag in (f"--{name}", f"-{name}"):
             return "" if value[:1] in DASHES else value
     return ""

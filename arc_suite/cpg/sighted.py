@@ -171,9 +171,9 @@ class Sighted(CommandLaw):
         swing_places, shifts = self._move_to_footholds(state, leg_phases, velocity, predicted_velocity)
         stance_places = self._move_with_ground(state, leg_phases, velocity)
         is_stance = leg_phases < self.duty_factor
-        places = xp.where(is_stance[..., None], stance_places, swing_places)
+        ground_positions = xp.where(is_stance[..., None], stance_places, swing_places)
         heights = self._lift_feet(leg_phases, gait_size, vertical)
-        return xp.concatenate([places, heights[..., None]], axis=-1), shifts
+        return xp.concatenate([ground_positions, heights[..., None]], axis=-1), shifts
 
     def _move_to_footholds(self, state: SightedState, leg_phases, velocity, predicted_velocity) -> tuple:
         """Return where feet in swing are next, (environments, legs, 2) m, and shifts of footholds; see `_next_feet`.
@@ -191,8 +191,8 @@ class Sighted(CommandLaw):
         footholds_at_landing, shifts = self._find_footholds(state, velocity, torso_displacement, is_fixed)
         swing_goals = footholds_at_landing + torso_drift * arrival_steps[..., None]
         remaining_steps = (xp.floor(steps_to_landing - arrival_steps) + 1.0)[..., None]
-        places = state.feet[..., :2]
-        return places + (swing_goals - places) / remaining_steps, shifts
+        positions = state.feet[..., :2]
+        return positions + (swing_goals - positions) / remaining_steps, shifts
 
     def _move_with_ground(self, state: SightedState, leg_phases, velocity):
         """Return where feet in stance are next, (environments, legs, 2) m; see `_next_feet`.

@@ -302,6 +302,7 @@ WRONG_CURES = {
     "play --legs 6 --robot=tick -o a.html": "--robot=tick: expected no robot with --spec or --legs\n",
     "play --robot=tick --arena a.png:9x9x1 -o a.html": "cannot read a.png: no such file or directory",
     "studio --policy runs/none": "cannot read runs/none: no such file\n",
+    "evaluate --robot=tick --json=a.png": "unknown extension '.png' (there are: .json); arc-suite render writes",
     "transfer --policy ppo": "policy ppo: expected universal, or the folder of a run of many bodies\n",
     "transfer --task mimic": "task mimic: expected one that prescribes a gait\n",
     "export cpg": "policy cpg: expected the folder of a run, or universal with a body\n",

@@ -365,7 +365,7 @@ def _add_root_tracks(tracks: _ClipTracks, clip: Clip, root: int, root_moves: boo
 def _root_path(ground_poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return positions (n, 3) and quaternions (n, 4) of a root at ground poses (n, 3), x, y, m, and yaw, rad."""
     positions = np.concatenate([ground_poses[:, :2], np.zeros((len(ground_poses), 1))], axis=-1)
-    orientations = rotations.turn_about_z(np.array((1.0, 0.0, 0.0, 0.0)), ground_poses[:, 2])
+    orientations = rotations.turn_about_z(np.array(rotations.NO_TURN), ground_poses[:, 2])
     return positions, orientations
 
 

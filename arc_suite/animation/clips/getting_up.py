@@ -1,5 +1,6 @@
 """How a body gets up from a fall: by a policy of the package or by `rising`, then in steps to the pose at rest."""
 
+import contextlib
 import itertools
 import math
 from collections.abc import Iterator
@@ -83,11 +84,11 @@ def _record_falls(body: Body, lies_on: str) -> Iterator[Recording]:
 def _find_falls(setup: Setup, lies_on: str) -> Iterator[int]:
     """Yield the seeds of episodes in which a body lies on its belly, side or back at the start."""
     least, largest = _TILTS[lies_on]
-    environment = setup.load()
-    for seed in range(_SEEDS):
-        environment.reset(seed)
-        if least <= rotations.upright(environment.physics.data.qpos[3:7]) <= largest:
-            yield seed
+    with contextlib.closing(setup.load()) as environment:
+        for seed in range(_SEEDS):
+            environment.reset(seed)
+            if least <= rotations.upright(environment.physics.data.qpos[3:7]) <= largest:
+                yield seed
 
 
 def _samples_to_stand(body: Body, recording: Recording) -> int:

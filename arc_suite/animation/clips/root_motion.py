@@ -195,6 +195,16 @@ def fade_out(share: np.ndarray) -> np.ndarray:
     return 1.0 - share**2 * (3.0 - 2.0 * share)
 
 
+def away_from_ends(from_start: np.ndarray, to_end: np.ndarray) -> np.ndarray:
+    """Return weights that rise smoothly from 0 at the start to 1, and fall to 0 at the end.
+
+    Args:
+        from_start: (samples,) distance of each sample from the start, as a share of the rise.
+        to_end: (samples,) its distance from the end, as a share of the fall.
+    """
+    return (1.0 - fade_out(from_start)) * (1.0 - fade_out(to_end))
+
+
 def share_of_largest(values: np.ndarray) -> np.ndarray:
     """Return values (n,) as shares of the largest absolute one; 0 if all are 0."""
     return values / max(abs(values).max(), _MIN_DIVISOR)

@@ -15,7 +15,6 @@ from arc_suite.models import swinging
 from arc_suite.models.swinging import SwingingBone
 from arc_suite.robots.spec import Body
 
-_NO_TURN = np.array((1.0, 0.0, 0.0, 0.0))
 _FADING_SHARE = 1.0 / 3.0  # of a clip, in which the difference to the pose at its end fades
 
 
@@ -77,7 +76,7 @@ def _swing_in_loop(bone: SwingingBone, motion: ClipMotion) -> _Swings:
     """Return how a bone swings in a loop, as if it had gone on forever."""
     positions, orientations = _place_torso(motion)
     anchor = swinging.hold_mass(bone, positions, orientations)
-    turn = np.array(rotations.matrix(rotations.turn_about_z(_NO_TURN, motion.root[-1, 2])))
+    turn = np.array(rotations.matrix(rotations.turn_about_z(np.array(rotations.NO_TURN), motion.root[-1, 2])))
     last_velocity = (anchor[-1] - anchor[-2]) / motion.time_step
     begin = swinging.rest(anchor[0])._replace(velocity=last_velocity @ turn)  # as it was a round before
     rings = _follow(bone, motion.time_step, anchor, begin)

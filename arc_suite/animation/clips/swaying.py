@@ -15,7 +15,7 @@ import numpy as np
 from arc_suite import checks
 from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.foot_contacts import TOUCH_DOWN, find_foot_contacts, sole_heights
-from arc_suite.animation.clips.root_motion import fade_out, share_of_largest
+from arc_suite.animation.clips.root_motion import away_from_ends, share_of_largest
 from arc_suite.animation.clips.standing_legs import HEIGHT
 from arc_suite.models import posture
 from arc_suite.models.standing import GRAVITY, time_unit
@@ -206,9 +206,9 @@ def sink_in_turn(body: Body, draft: Draft, character: Character) -> np.ndarray:
         landed_feet[contact.sample] += contact.event == TOUCH_DOWN
     depth = share_of_largest(character.follow(body, landed_feet, draft.motion.time_step))
     shares = np.linspace(0.0, 1.0, samples)
-    away_from_ends = (1.0 - fade_out(shares / _FADE_SHARE)) * (1.0 - fade_out((1.0 - shares) / _FADE_SHARE))
+    weights = away_from_ends(shares / _FADE_SHARE, (1.0 - shares) / _FADE_SHARE)
     poses = np.zeros((samples, len(posture.POSE_NAMES)))
-    poses[:, HEIGHT] = -character.amplitude * character.bob * away_from_ends * depth
+    poses[:, HEIGHT] = -character.amplitude * character.bob * weights * depth
     return poses
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from arc_suite.animation.clips import standing_legs
-from arc_suite.animation.clips.root_motion import ClipMotion, Pose, fade_out
+from arc_suite.animation.clips.root_motion import ClipMotion, Pose, away_from_ends, fade_out
 from arc_suite.models.standing import time_unit
 from arc_suite.robots.spec import Body
 
@@ -39,7 +39,8 @@ def turn(body: Body, rest: Pose, angle: float) -> ClipMotion:
         lifts = _foot_displacements(body, rest, foot_yaw - yaw[:, None], _LIFT * swing)
         for sink in _SINKS:
             poses = np.zeros((len(times), 6))
-            poses[:, standing_legs.HEIGHT] = -sink * _hold_between_ends(progress, steps)
+            # It sinks in the first step, and rises in the last one.
+            poses[:, standing_legs.HEIGHT] = -sink * away_from_ends(progress * steps, (1.0 - progress) * steps)
             motion = standing_legs.follow_exactly(body, rest, poses, lifts, _SMOOTHING_ROUNDS)
             if motion is not None:
                 root = yaw[:, None] * (0.0, 0.0, 1.0)
@@ -82,11 +83,6 @@ def _step_in_turn(body: Body, yaw: np.ndarray, progress: np.ndarray, steps: int)
             swing[is_swing, leg] = np.sin(np.pi * share[is_swing]) ** 2
             landed_yaw = next_yaw
     return foot_yaw, swing
-
-
-def _hold_between_ends(progress: np.ndarray, steps: int) -> np.ndarray:
-    """Return shares (samples,) that rise from 0 to 1 in the first step, and fall to 0 in the last one."""
-    return (1.0 - fade_out(progress * steps)) * (1.0 - fade_out((1.0 - progress) * steps))
 
 
 def _foot_displacements(body: Body, rest: Pose, turns: np.ndarray, heights: np.ndarray) -> np.ndarray:

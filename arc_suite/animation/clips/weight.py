@@ -20,7 +20,7 @@ from arc_suite import rotations
 from arc_suite.animation.clips import bounds, planting, transients
 from arc_suite.animation.clips.catalog import Acted, Kind, Passage, Turn, WalkLoop, clip_of
 from arc_suite.animation.clips.draft import Draft
-from arc_suite.animation.clips.root_motion import ClipMotion, fade_out, share_of_largest
+from arc_suite.animation.clips.root_motion import ClipMotion, away_from_ends, fade_out, share_of_largest
 from arc_suite.animation.clips.standing_legs import (
     TRIED_SHARES,
     has_free_feet,
@@ -177,8 +177,8 @@ def _follow_acceleration(body: Body, clip: Passage, draft: Draft, character: Cha
     pitch = character.pitch / GRAVITY * np.gradient(speed, motion.time_step)
     lowest, highest = (0.0, MAX_TILT) if clip.starts else (-MAX_TILT, 0.0)
     cycles = _cycles(draft)
-    away_from_ends = (1.0 - fade_out(cycles / _FADE_CYCLES)) * (1.0 - fade_out(cycles[::-1] / _FADE_CYCLES))
-    return character.amplitude * away_from_ends * character.follow(body, pitch.clip(lowest, highest), motion.time_step)
+    weights = away_from_ends(cycles / _FADE_CYCLES, cycles[::-1] / _FADE_CYCLES)
+    return character.amplitude * weights * character.follow(body, pitch.clip(lowest, highest), motion.time_step)
 
 
 def _weigh_gait(body: Body, gait: _ConnectedGait, character: Character) -> dict[str, Draft]:
