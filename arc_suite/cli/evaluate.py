@@ -14,7 +14,6 @@ every episode, and hashes of policy, body, model and task.
 """
 
 import functools
-from pathlib import Path
 
 from absl import flags
 
@@ -36,8 +35,7 @@ flags.DEFINE_string("json", None, "File to write the metrics to, as JSON, with e
 
 def main() -> None:
     """Print the table and write the JSON."""
-    if FLAGS.json is not None and Path(FLAGS.json).suffix:
-        outputs.check_extension(FLAGS.json, [".json"])
+    outputs.check_json(FLAGS.json)
     files.check_target(FLAGS.json)
     setups = setups_from_flags()
     checks.seed(FLAGS.seed + FLAGS.episodes - 1)

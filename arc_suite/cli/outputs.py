@@ -4,6 +4,8 @@ import os
 from collections.abc import Iterable
 from pathlib import Path
 
+from absl import flags
+
 from arc_suite import checks
 
 _MESH = "arc-suite animate writes a .glb, which Blender turns into others"
@@ -23,6 +25,7 @@ _PROGRAM_OF_EXTENSION = {
     ".webp": _PICTURES,
     ".xml": "arc-suite build_model writes .xml",
 }
+_EXTENSIONS = (*_PROGRAM_OF_EXTENSION, ".csv", ".json", ".npz")  # of files that programs write
 
 
 def check_extension(path: str | os.PathLike[str], valid: Iterable[str]) -> str:
@@ -42,3 +45,30 @@ def check_extension(path: str | os.PathLike[str], valid: Iterable[str]) -> str:
         if program is None:
             raise
         raise ValueError(f"{error}; {program}") from None
+
+
+def check_folders(*names: str) -> None:
+    """Check that flags that name folders have no file's extension.
+
+    Args:
+        names: names of the flags.
+
+    Raises:
+        ValueError: a value ends in an extension of a file that a program writes, and is no folder.
+    """
+    for name in names:
+        path = Path(flags.FLAGS[name].value or "")
+        if path.suffix.lower() in _EXTENSIONS and not path.is_dir():
+            program = _PROGRAM_OF_EXTENSION.get(path.suffix.lower())
+            cure = f"; {program}" if program else ""
+            raise ValueError(f"--{name}={path}: expected a folder, got the name of a file{cure}")
+
+
+def check_json(path: str | None) -> None:
+    """Check the path of a file that takes JSON: none, one that ends in `.json`, or one without an extension.
+
+    Raises:
+        ValueError: another extension.
+    """
+    if path is not None and Path(path).suffix:
+        check_extension(path, [".json"])

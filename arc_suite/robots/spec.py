@@ -95,7 +95,9 @@ class SpecError(ValueError):
 
 def _check_name(value: Any) -> str:
     if not isinstance(value, str) or not _NAME_PATTERN.fullmatch(value):
-        raise SpecError(f"expected 1 to {MAX_NAME} characters out of [a-z0-9_], got {_preview(value)}")
+        valid = re.sub(r"[\s-]+", "_", value.strip().lower()) if isinstance(value, str) else ""
+        cure = f"; did you mean {valid!r}?" if _NAME_PATTERN.fullmatch(valid) else ""
+        raise SpecError(f"expected 1 to {MAX_NAME} characters out of [a-z0-9_], got {_preview(value)}{cure}")
     return value
 
 

@@ -118,7 +118,10 @@ def test_summary_prints_the_figures_alone():
         (["--legs=4", "--render=x.txt"], "unknown extension '.txt' (there are: .png)"),
         (["--legs=4", "--render=x"], "x: expected a name that ends in .png"),
         (["--legs=4", "--output=x.json"], "--output=x.json: a model is .xml; --json writes the spec"),
-        (["--legs=4", "--name=Flea"], "Body.name: expected 1 to 32 characters out of [a-z0-9_], got 'Flea'"),
+        (
+            ["--legs=4", "--name=Flea"],
+            "Body.name: expected 1 to 32 characters out of [a-z0-9_], got 'Flea'; did you mean 'flea'?",
+        ),
         (["--legs=4", "--name=tick"], "--name=tick: it is a robot of the suite, whose numbers go with its name"),
         (["--spec=missing.json"], "cannot read missing.json: no such file or directory"),
     ],

@@ -259,6 +259,8 @@ FIRST_HOUR = {
 DATASETS = "--id names a dataset; datasets lie in ~/.minari/datasets, or where MINARI_DATASETS_PATH points\n"
 NO_TASK = "a page has the task of its policy\n"
 FRICTION = "did you mean --set friction=0.5?"
+LOWER_CASE = "expected 1 to 32 characters out of [a-z0-9_]"
+NO_FOLDER = "expected a folder, got the name of a file"
 # What once was answered by a wrong cure.
 WRONG_CURES = {
     "train --robot=tick --ppo": "unknown flag 'ppo'; did you mean --algorithm=ppo?\n",
@@ -309,6 +311,13 @@ WRONG_CURES = {
     "evaluate --policy tick-walk-ppo-0": "unknown policy 'tick-walk-ppo-0'; did you mean runs/tick-walk-ppo-0?\n",
     "card tick-walk-ppo-0": "tick-walk-ppo-0: no folder of a run; did you mean runs/tick-walk-ppo-0?\n",
     "card runs/tick-walk-ppo": "runs/tick-walk-ppo: no folder of a run; did you mean runs/tick-walk-ppo-0?\n",
+    "build_model --legs 6 --name Krabbo": f"Body.name: {LOWER_CASE}, got 'Krabbo'; did you mean 'krabbo'?\n",
+    "style --robot=tick --json=a.csv": "unknown extension '.csv' (there are: .json)\n",
+    "style --robot=tick -o a.png": f"--output=a.png: {NO_FOLDER}; arc-suite render writes pictures",
+    "train --robot=tick -o a.npz": f"--output=a.npz: {NO_FOLDER}\n",
+    "design -o a.glb": f"--output=a.glb: {NO_FOLDER}; arc-suite animate writes .glb\n",
+    "benchmark --results a.csv": f"--results=a.csv: {NO_FOLDER}\n",
+    "export universal --runner a.onnx": f"--runner=a.onnx: {NO_FOLDER}; arc-suite export writes .onnx\n",
     "build_model --spec=spider --length l9_lower=2": "unknown link 'l9_lower'; did you mean 'l4_lower'? (there are: ",
 }
 LINES = CURED | OTHERS | MISPLACED | FIRST_HOUR | WRONG_CURES

@@ -48,9 +48,9 @@ LENGTH = "expected a number from 1e-06 to 100, got "
     ("spec", "field", "value", "message"),
     [
         # names
-        (LEG, "name", "L1", f"Leg.name: {NAME}'L1'"),
+        (LEG, "name", "L1", f"Leg.name: {NAME}'L1'; did you mean 'l1'?"),
         (LEG, "name", "", f"Leg.name: {NAME}''"),
-        (LEG, "name", "l1\n", f"Leg.name: {NAME}'l1\\n'"),
+        (LEG, "name", "l1\n", f"Leg.name: {NAME}'l1\\n'; did you mean 'l1'?"),
         (LEG, "name", "a/b", f"Leg.name: {NAME}'a/b'"),
         (LEG, "name", "bein_ä", f"Leg.name: {NAME}'bein_ä'"),
         (LEG, "name", "a" * 33, f"Leg.name: {NAME}'{'a' * 33}'"),

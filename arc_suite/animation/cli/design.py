@@ -29,6 +29,7 @@ from arc_suite.animation.design.axes import Map
 from arc_suite.animation.design.genes import Budget, ProportionGenes, VariantGenes, extent
 from arc_suite.animation.design.search import BATCH_SIZE, RANDOM_BODIES, Candidates, Search
 from arc_suite.animation.design.trials import GOALS, Outcome, Trial, evaluate, measure_walk
+from arc_suite.cli import outputs
 from arc_suite.cli.flags import MAX_COUNT, ROBOT_HELP, named_values, refuse_flags
 from arc_suite.cli.program import progress, resumable, say
 from arc_suite.journal import Journal
@@ -192,6 +193,7 @@ def main() -> None:
     prepare_jax()
     if not FLAGS.output:
         raise ValueError("no folder to write to; say --output=FOLDER")
+    outputs.check_folders("output")
     goal = GOALS[checks.name(FLAGS.goal, GOALS, "goal")]
     around = None if FLAGS.around is None else registry.body_of(FLAGS.around)
     if around is None:

@@ -21,6 +21,7 @@ from absl import flags
 
 from arc_suite import checks, evaluation, files, style, versions
 from arc_suite.animation import pages
+from arc_suite.cli import outputs
 from arc_suite.cli.flags import (
     MAX_COUNT,
     bodies_from_flags,
@@ -141,6 +142,8 @@ def check_files(robots: list[str]) -> None:
         ValueError: another extension, several robots to save, or no viewer of pages.
         OSError: the folder of pictures cannot be made.
     """
+    outputs.check_json(FLAGS.json)
+    outputs.check_folders("output")
     for flag, extension in (("page", ".html"), ("save", ".npz")):
         path = FLAGS[flag].value
         if path is not None and not path.endswith(extension):

@@ -215,6 +215,24 @@ def is_additive(name: str) -> bool:
             return isinstance(clip, Difference)
 
 
+def check_is_motion(name: str) -> None:
+    """Check that a clip is a motion by itself.
+
+    Raises:
+        ValueError: an additive clip. The text names the clip that is the motion, if there is one.
+    """
+    if not is_additive(name):
+        return
+    match clip_of(name):
+        case Difference() as clip:
+            cure = f": take {clip.loop}"
+        case BlowClip() as clip:
+            cure = f": take stagger_{clip.side}"
+        case _:
+            cure = ""
+    raise ValueError(f"clips: {name} is added to another clip, and is no motion by itself{cure}")
+
+
 def recordings_for_clips(names: Sequence[str]) -> dict[str, list[str]]:
     """Return the names of the recordings that clips use, each with the clips that cannot be made without it.
 

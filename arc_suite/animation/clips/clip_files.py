@@ -157,6 +157,8 @@ def _check_arguments(path: Path, names: Sequence[str], fps: float, options: Mapp
             raise ValueError(f"{option}: it is for {', '.join(suitable)}, not for {extension}")
     if extension not in _SEVERAL_CLIPS and (len(names) != 1 or names == [ALL]):
         raise ValueError(f"clips: expected one for {extension}, got {', '.join(names)}")
+    if extension == motion_files.EXTENSION and not _is_motion(names[0]):
+        catalog.check_is_motion(names[0])
     films.check_fps(fps, extension)
     for option in OPTION_BOUNDS.keys() & options.keys():
         if options[option] is not None:

@@ -17,6 +17,7 @@ from pathlib import Path
 from absl import flags
 
 from arc_suite import checks, evaluation, files
+from arc_suite.cli import outputs
 from arc_suite.cli.flags import refuse_flags
 from arc_suite.cli.program import progress, resumable, say
 from arc_suite.learning.studies import benchmark, entries, publication, report, results, runner, tables
@@ -43,6 +44,7 @@ def main(division: str | None = None) -> int:
     places = [checks.name(place, _PLACE_NAMES, "place") for place in FLAGS.places]
     status = 0
     _check_flags(division)
+    outputs.check_folders("runs", "results")
     if division is not None:
         checks.name(division, DIVISIONS, "division")
         if FLAGS.policies:

@@ -59,6 +59,7 @@ def main(run: str | None = None) -> None:
         raise ValueError("expected the folder of a run, a policy file or a zip of stable-baselines3; see --help")
     if run in policies.POLICIES and run != universal.NAME:
         raise ValueError(f"policy {run}: expected the folder of a run, or universal with a body")
+    outputs.check_folders("runner")
     path = Path(run)
     name = policy_name(run)
     folder = path if path.is_dir() else path.parent

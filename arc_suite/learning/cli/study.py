@@ -21,6 +21,7 @@ from pathlib import Path
 from absl import flags
 
 from arc_suite import checks, files, versions
+from arc_suite.cli import outputs
 from arc_suite.cli.flags import refuse_flags
 from arc_suite.cli.program import progress, resumable
 from arc_suite.learning.studies import publication, report, runner, tables
@@ -85,6 +86,7 @@ def make_or_report(
         refuse_flags(("jobs", "submit"), "goes without --device, on which runs learn in this process")
     else:
         refuse_flags(["minutes"], "goes with --device")
+    outputs.check_folders("runs", "results")
     part, parts = shard(FLAGS.shard)
     runs = study.runs[part::parts]
     if not runs:

@@ -32,6 +32,7 @@ from typing import Any
 from absl import flags
 
 from arc_suite import checks, evaluation, files, registry
+from arc_suite.cli import outputs
 from arc_suite.cli.flags import (
     custom_body,
     define_body,
@@ -164,6 +165,7 @@ _CONFIGURATION_FLAGS = (
 
 def main() -> int:
     """Train, print the return at the end, and return the exit status."""
+    outputs.check_folders("output")
     prepare_jax()
     runs = configurations_from_flags()
     is_one_of_several = FLAGS["seed"].present > 1  # `train_seeds` adds a seed to flags that may have --jobs

@@ -29,10 +29,11 @@ def test_loop_turns_by_its_command(tmp_path):
     assert 0.5 < motion.planted.mean() < 0.7  # the duty factor of the gait
 
 
-@pytest.mark.slow
-def test_additive_clip_is_no_motion(tmp_path):
-    with pytest.raises(ValueError, match="clips: hit_left is added to another clip, and is no motion by itself"):
-        animation.animate("tick", tmp_path / "hit.npz", "hit_left")
+@pytest.mark.parametrize(("name", "motion"), [("hit_left", "stagger_left"), ("limp", "limp_walk")])
+def test_additive_clip_is_no_motion(name, motion, tmp_path):
+    line = f"clips: {name} is added to another clip, and is no motion by itself: take {motion}"
+    with pytest.raises(ValueError, match=line):
+        animation.animate("tick", tmp_path / "motion.npz", name)
     assert not list(tmp_path.iterdir())
 
 
