@@ -2,6 +2,7 @@
 
   arc-suite import go2.xml -o go2.json
   arc-suite import mini_cheetah.xml --home crouch --feet FL_foot,FR_foot,RL_foot,RR_foot -o cheetah.json
+  arc-suite import spot.urdf --home "*_thigh=0.8,*_calf=-1.5" -o spot.json
 
 The file that is written is a body with the physics of the robot's file, to the last bit: on the floor of the
 suite, without contacts of the robot with itself. It needs no other file. A line each tells the legs, the
@@ -24,7 +25,12 @@ from arc_suite.robots.spec_files import body_to_json, check_kind, refuse_folder
 
 FLAGS = flags.FLAGS
 flags.DEFINE_string("output", None, "File to write the body to, in JSON. [default: none]", short_name="o")
-flags.DEFINE_string("home", None, "Keyframe of the file in which the robot stands. [default: one that stands]")
+flags.DEFINE_string(
+    "home",
+    None,
+    "Keyframe of the file in which the robot stands, or angles of its joints, rad, other joints at zero: "
+    "*_thigh=0.8,*_calf=-1.5. [default: a pose that stands]",
+)
 flags.DEFINE_list("feet", [], "Bodies or geoms at the ends of the legs. [default: those that reach lowest]")
 flags.DEFINE_float(
     "armature",

@@ -107,7 +107,8 @@ def import_robot(
 
     Args:
         path: path of the file.
-        home: name of the keyframe in which it stands; None to find a pose.
+        home: name of the keyframe in which it stands, or angles of its joints, rad, such as "*_thigh=0.8,*_calf=-1.5":
+            other joints are at zero, or at the nearest angle of their range; None to find a pose.
         feet: names of bodies or geoms at the ends of its legs; none to find them.
         armature: rotor inertia of each joint for which the file has none, kg m^2; None for none, or for a small one
             where joints buzz without it.

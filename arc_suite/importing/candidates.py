@@ -48,7 +48,12 @@ def list_poses(robot: Robot, named_feet: dict[Chain, list[int]] | None) -> Itera
         if qpos is not None:
             yield "search for bent knees", qpos
     yield "middle of the ranges", _middle_pose(robot)
-    yield "zero angles within the ranges", robot.clip_to_limits(_relax(robot, model.qpos0))
+    yield "zero angles within the ranges", zero_pose(robot)
+
+
+def zero_pose(robot: Robot) -> np.ndarray:
+    """Return the pose (nq,) of zero angles, or the nearest ones within the ranges of the joints."""
+    return robot.clip_to_limits(_relax(robot, robot.model.qpos0))
 
 
 def _middle_pose(robot: Robot) -> np.ndarray:

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.importing import candidates, kinds, loops, tree
+from arc_suite.importing import candidates, home_angles, kinds, loops, tree
 from arc_suite.importing.candidates import ChainEnd
 from arc_suite.importing.tree import Chain, Robot
 from arc_suite.models.standing import stability_margin
@@ -95,16 +95,16 @@ def find_stance(robot: Robot, home: str | None, feet: Sequence[str]) -> Stance:
 
     Args:
         robot: robot of the file.
-        home: name of a keyframe, which is then taken without checks; None to find a pose.
+        home: name of a keyframe or angles of joints, which are then taken without checks; None to find a pose.
         feet: names of bodies or geoms at the ends of the legs; none to find them.
 
     Raises:
         NoStance: no pose stands.
-        SpecError: a name is not in the file, or the pose of the keyframe has no legs.
+        SpecError: a name is not in the file, or the pose of `home` has no legs.
     """
     named_feet = _find_named_feet(robot, feet) if feet else None
     if home is not None:
-        return _stance_of_keyframe(robot, home, named_feet)
+        return _stance_of_home(robot, home, named_feet)
     # Straight legs are better than none: a second round admits them.
     origins_by_reason: dict[str, str] = {}
     tried_poses = []
@@ -121,22 +121,29 @@ def find_stance(robot: Robot, home: str | None, feet: Sequence[str]) -> Stance:
             origins_by_reason.setdefault(str(reason), origin)
     reasons = [f"{origin}: {reason}" for reason, origin in origins_by_reason.items()]
     chains = kinds.describe_chains(robot.model, robot.root)
-    cure = "name a keyframe that stands with --home, or the feet with --feet"
+    cure = "name a keyframe that stands, or give its angles, with --home, or the feet with --feet"
     raise NoStance(f"{chains}, and no standing pose ({'; '.join(reasons[:_MAX_REASONS])}); {cure}")
 
 
-def _stance_of_keyframe(robot: Robot, home: str, named_feet: dict[Chain, list[int]] | None) -> Stance:
-    """Return the stance of a keyframe, without checks except that it has legs."""
+def _stance_of_home(robot: Robot, home: str, named_feet: dict[Chain, list[int]] | None) -> Stance:
+    """Return the stance of a keyframe or of angles, without checks except that it has legs."""
     keyframes = [robot.model.key(key).name for key in range(robot.model.nkey)]
-    if not any(keyframes):
+    if home not in keyframes and home_angles.is_angles(home):
+        origin = "angles of --home"
+        qpos = home_angles.pose_of_angles(robot, home)
+    elif any(keyframes):
+        origin = f"keyframe {home}"
+        key = keyframes.index(_check_name(home, keyframes, "keyframe"))
+        qpos = robot.model.key_qpos[key]
+    else:
         raise SpecError(
-            f"keyframe {checks.preview(home)}: the file names none; without --home a standing pose is found"
+            f"keyframe {checks.preview(home)}: the file names none; --home takes angles, too, such as knee=-1.4,hip=0; "
+            "without --home a standing pose is found"
         )
-    key = keyframes.index(_check_name(home, keyframes, "keyframe"))
     try:
-        return _stance_of_pose(robot, robot.model.key_qpos[key], f"keyframe {home}", named_feet, is_checked=False)
+        return _stance_of_pose(robot, qpos, origin, named_feet, is_checked=False)
     except _Unfit as reason:
-        raise SpecError(f"keyframe {home}: {reason}") from None
+        raise SpecError(f"{origin}: {reason}") from None
 
 
 def _check_name(name: str, valid_names: Sequence[str], kind: str) -> str:

@@ -39,6 +39,7 @@ def test_without_output_it_writes_nothing(tmp_path):
 def test_flags_reach_the_importer(tmp_path):
     assert "keyframe home" in programs.passed(run(GO2, "--home=home", "--feet=FL,FR,RL,RR"))
     programs.refused(run(GO2, "--feet=nose"), f"arc-suite import: {GO2}: unknown foot 'nose'")
+    assert "standing pose: angles of --home" in programs.passed(run(GO2, "--home=*_thigh*=0.8,*_calf*=-1.5"))
 
 
 def test_bad_arguments_are_one_line_and_write_nothing(tmp_path):
@@ -49,7 +50,7 @@ def test_bad_arguments_are_one_line_and_write_nothing(tmp_path):
         ((GO2, "--home=sit", "-o", tmp_path / "a.json"), f"{GO2}: unknown keyframe 'sit' (there are: lying, home)\n"),
         (
             (GO2.with_name("a1_like.urdf"), "--home=sit"),
-            f"{GO2.with_name('a1_like.urdf')}: keyframe 'sit': the file names none; without --home a standing pose is ",
+            f"{GO2.with_name('a1_like.urdf')}: keyframe 'sit': the file names none; --home takes angles, too, such as ",
         ),
         (
             (EXAMPLES["crab"],),

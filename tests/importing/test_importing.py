@@ -11,6 +11,7 @@ import pytest
 
 from arc_suite import registry
 from arc_suite.importing import import_robot
+from arc_suite.models import source
 from arc_suite.models.standing import stability_margin
 from arc_suite.robots import sources
 from arc_suite.robots.spec import SpecError
@@ -205,6 +206,44 @@ def test_a_keyframe_that_is_named_is_the_standing_pose(tmp_path):
         SpecError, match=r"go2\.xml: unknown keyframe 'lo'; did you mean 'low'\? \(there are: lying, home, low\)$"
     ):
         import_robot(path, home="lo")
+
+
+POSES = pytest.mark.parametrize(
+    ("path", "home"),
+    [(GO2, "*_thigh_joint=0.7, *_calf_joint=-1.5, F?_thigh_joint=0.8"), (A1, "*_thigh*=0.7,*_calf*=-1.5,F*thigh*=0.8")],
+    ids=["mjcf", "urdf"],
+)
+
+
+@POSES
+def test_angles_that_are_given_are_the_standing_pose(path, home):
+    body, notes = import_robot(path, home=home)
+    home_angles = source.angles_at_home(body)
+    for leg in body.legs:
+        thigh = 0.8 if leg.name in ("l1", "r1") else 0.7
+        assert [home_angles[leg.full_name(joint)] for joint in leg.joints] == pytest.approx([0.0, thigh, -1.5])
+    assert any(note.startswith("standing pose: angles of --home, torso 0.") for note in notes)
+
+
+def test_joints_without_an_angle_are_at_zero_or_as_near_as_their_range():
+    home_angles = source.angles_at_home(import_robot(GO2, home="*_thigh_joint=0.8").body)
+    assert home_angles["l1_joint1"] == 0.0 and home_angles["l1_joint3"] == pytest.approx(-0.83776)
+
+
+@pytest.mark.parametrize(
+    ("home", "line"),
+    [
+        ("FL_claf_joint=-1", r"home: unknown joint 'FL_claf_joint'; did you mean 'FL_calf_joint'\?"),
+        ("*_knee=-1", r"home: unknown joint '\*_knee'"),
+        ("*_calf_joint=0", r"home: joint 'FL_calf_joint': expected -2.723 to -0.8378 rad, got 0$"),
+        ("*_calf_joint=-80", r"home: joint .* got -80; angles are in rad, not in degrees$"),
+        ("*_calf_joint=nan", r"home: joint 'FL_calf_joint': expected .* got nan$"),
+        ("FL_calf_joint=-1,FR_calf_joint", r"home: expected joint=angle in rad, got 'FR_calf_joint'$"),
+    ],
+)
+def test_angles_that_are_wrong_are_named(home, line):
+    with pytest.raises(SpecError, match=rf"^\S*go2_like\.xml: {line}"):
+        import_robot(GO2, home=home)
 
 
 def test_feet_can_be_named_by_geom_or_body():
