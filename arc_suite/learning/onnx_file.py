@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from arc_suite import files, versions
+from arc_suite.envs.setup import Setup
 from arc_suite.learning.policy_metadata import metadata
 from arc_suite.policies.graph import EPSILON, INPUT, Graph
 from arc_suite.policies.network import Network
@@ -23,15 +24,20 @@ OPSET = 17  # the first with LayerNormalization
 IR_VERSION = 8  # the format of the same release, so that older runtimes read it
 
 
-def save(path: str | os.PathLike[str], network: Network) -> None:
+def save(path: str | os.PathLike[str], network: Network, training: Setup | None = None) -> None:
     """Write a policy of one body as ONNX, atomically.
+
+    Args:
+        path: path of the file.
+        network: the policy.
+        training: setup in which it learned, None for that of the policy.
 
     Raises:
         ValueError: the package onnx is not installed, or a policy of many bodies.
         OSError: the file cannot be written.
     """
     metadata_texts = {}
-    for name, value in metadata(network).items():
+    for name, value in metadata(network, training).items():
         metadata_texts[name] = value if isinstance(value, str) else json.dumps(value)
     with versions.require_extra("ONNX needs the package onnx", "learn"):
         import onnx

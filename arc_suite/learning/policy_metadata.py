@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from arc_suite.envs.setup import Setup
 from arc_suite.models import sizing, source
 from arc_suite.models.standing import measure_standing
 from arc_suite.policies.network import Network
@@ -14,8 +15,8 @@ from arc_suite.tasks.modified_task import has_active
 from arc_suite.tasks.modifiers import Delay, History
 
 
-def metadata(network: Network) -> dict:
-    """Return the metadata of a policy's file, by name.
+def metadata(network: Network, training: Setup | None = None) -> dict:
+    """Return the metadata of a policy's file, by name; given the setup in which it learned, None for the policy's.
 
     robot, task, task_kwargs    setup of the training, or the setup that the policy was exported for
     blocks                      size of every block of the observation by name, in order
@@ -63,7 +64,7 @@ def metadata(network: Network) -> dict:
         values["file_joints"] = list(body.file_joints)
     if "gait_clock" in network.blocks and task.parameters is not None:
         values["gait_clock"] = {"frequency": task.parameters.gait_frequency, "rule": _clock_rule(task)}
-    return values | dict(_timing(task))
+    return values | dict(_timing(task, task if training is None else training.definition))
 
 
 def _clock_rule(task: Task) -> str:
@@ -118,8 +119,8 @@ def _speed_limit(joint: Joint) -> dict[str, float]:
     return {"no_load_speed": drive.no_load_speed, "stall": drive.stall_torque}
 
 
-def _timing(task: Task) -> Mapping[str, Any]:
-    """Return the metadata of history and delay, where the task has them."""
+def _timing(task: Task, training_task: Task) -> Mapping[str, Any]:
+    """Return the metadata of the history of a task and of the delay in training, where they have them."""
     values: dict[str, Any] = {}
     if has_active(task, History):
         history = task.modifier(History)  # type: ignore[attr-defined]
@@ -129,6 +130,6 @@ def _timing(task: Task) -> Mapping[str, Any]:
             "layout": "of each control step its blocks and the action after them, the newest step first; "
             "before the start the first observation, with actions of 0",
         }
-    if has_active(task, Delay):
-        values["delay"] = list(task.modifier(Delay).delay)  # type: ignore[attr-defined]
+    if has_active(training_task, Delay):
+        values["delay"] = list(training_task.modifier(Delay).delay)  # type: ignore[attr-defined]
     return values

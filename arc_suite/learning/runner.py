@@ -4,9 +4,10 @@
 
     print(run(Policy.load(), read, write, command))
 
-`read()` returns `Sensors`, and `write(output)` hands an `Output` to the motors. Both have the order of `motors` in
-policy.json. `command()` returns the desired velocity: forward and left, m/s, and turning left, rad/s; a policy without
-commands ignores it. `python run.py` prints the motors, for which NumPy is enough.
+`read()` returns the newest `Sensors`, or None without a new message, and `write(output)` hands an `Output` to the
+motors. Both have the order of `motors` in policy.json. `command()` returns the desired velocity: forward and left, m/s,
+and turning left, rad/s. It is cut to the `command_ranges` of policy.json; a policy without commands ignores it.
+`python run.py` prints the motors, for which NumPy is enough.
 """
 
 import json
@@ -22,6 +23,7 @@ RAMP_TIME = 2.0  # s, from the present pose to the standing pose
 MAX_TILT = 60.0  # degrees
 MAX_EXCESS = 0.2  # rad, of a joint beyond its range
 MAX_LATENESS = 1.0  # control steps
+MAX_SILENCE = 5  # control steps without a new message of the sensors
 
 
 class Sensors(NamedTuple):
@@ -149,7 +151,8 @@ class Policy:
         quaternion = _product(np.asarray(sensors.quaternion), imu * (1.0, -1.0, -1.0, -1.0))
         is_start = self._tick < 0
         self._tick += self._was_going
-        desired = np.divide(command, facts["command_units"])
+        low, high = np.transpose(facts["command_ranges"])
+        desired = np.divide(np.clip(command, low, high), facts["command_units"])
         self._was_going = not facts["follows_commands"] or bool(desired.any())
         angle = 2.0 * math.pi * facts["gait_frequency"] * facts["control_timestep"] * self._tick
         # Opposite quaternions are one orientation: take the one that continues.
@@ -206,22 +209,34 @@ class Policy:
 
 def run(
     policy: Policy,
-    read: Callable[[], Sensors],
+    read: Callable[[], Sensors | None],
     write: Callable[[Output], None],
     command: Callable[[], tuple] = lambda: (0.0, 0.0, 0.0),
     steps: float = math.inf,
 ) -> str:
-    """Ramp to the standing pose and act for some control steps, then relax. Return the reason of an earlier stop."""
+    """Ramp to the standing pose and act for some control steps, then relax. Return the reason of an earlier stop.
+
+    Readings without any change are no new message: noise changes those of sensors. The policy acts on the latest
+    reading until `MAX_SILENCE`. Without a first message, nothing is written.
+    """
     period = policy.facts["control_timestep"]
     ramp_steps = math.ceil(RAMP_TIME / period)
     policy.reset()
     sensors = read()
+    if sensors is None:
+        return "no message of the sensors"
     first_angles = np.array(sensors.angles)
     step = 0
+    silence = 0  # control steps
     deadline = time.perf_counter()
     try:
         while step < ramp_steps + steps:
-            sensors = read()
+            reading = read()
+            is_new = reading is not None and not all(map(np.array_equal, reading, sensors))
+            silence = 0 if is_new else silence + 1
+            if silence > MAX_SILENCE:
+                return f"no new message of the sensors in {MAX_SILENCE * period:g} s"
+            sensors = reading if is_new else sensors
             fault = policy.find_fault(sensors)
             if fault:
                 return fault

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from arc_suite import files
+from arc_suite.envs.setup import Setup
 from arc_suite.learning import onnx_file, policy_metadata
 from arc_suite.models import source
 from arc_suite.policies.network import Network
@@ -38,17 +39,22 @@ _ESTIMATED = {"height": "torso's height", "velocity": "torso's velocity", "motio
 _ABSENT = "absent"  # before the name of a part that is 0
 
 
-def save(folder: str | os.PathLike[str], network: Network) -> list[str]:
+def save(folder: str | os.PathLike[str], network: Network, training: Setup | None = None) -> list[str]:
     """Write the files of a policy of one body into a folder, and return a line for each thing that its user must know.
+
+    Args:
+        folder: the folder.
+        network: the policy.
+        training: setup in which it learned, None for that of the policy.
 
     Raises:
         ValueError: the observation has a block that sensors do not give, or as `onnx_file.save`.
         OSError: a file cannot be written.
     """
-    facts = describe_machine(network)
+    facts = describe_machine(network, training)
     folder = files.folder(folder)
     onnx_path, json_path, runner_path = (folder / name for name in FILES)
-    onnx_file.save(onnx_path, network)
+    onnx_file.save(onnx_path, network, training)
     with files.writing(json_path) as temporary:
         temporary.write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
     with files.writing(runner_path) as temporary:
@@ -56,8 +62,8 @@ def save(folder: str | os.PathLike[str], network: Network) -> list[str]:
     return list(_notes(facts))
 
 
-def describe_machine(network: Network) -> dict[str, Any]:
-    """Return the content of policy.json.
+def describe_machine(network: Network, training: Setup | None = None) -> dict[str, Any]:
+    """Return the content of policy.json, given the setup of the training; see `save`.
 
     robot, task, task_kwargs    setup of the training; the name of the robot alone
     control_timestep            s between two actions
@@ -73,6 +79,7 @@ def describe_machine(network: Network) -> dict[str, Any]:
     history                     steps, and [part, size] of each
     follows_commands            whether there is a command; else the policy walks into the first heading
     command_units               m/s, m/s and rad/s of a desired velocity of 1
+    command_ranges              least and greatest desired velocity in training: forward and left, m/s, turning, rad/s
     gait_frequency              of the clock, Hz
     leak                        weight of the latest step in the mean velocity
     legs, stance_band           for the estimates: joints (indices of actions), axes and anchors of joints, and the foot
@@ -82,7 +89,7 @@ def describe_machine(network: Network) -> dict[str, Any]:
     Raises:
         ValueError: the observation has a block that sensors do not give, or a policy of many bodies.
     """
-    metadata = policy_metadata.metadata(network)
+    metadata = policy_metadata.metadata(network, training)
     task = network.setup.definition
     body = task.scene.body
     parts = {name: _parts_of_block(task, name) for name in network.blocks}
@@ -90,6 +97,9 @@ def describe_machine(network: Network) -> dict[str, Any]:
     history = metadata.get("history", {"steps": 0, "blocks": []})
     gait = task.parameters
     follows_commands = "command" in task.unwrapped.blocks
+    units = velocity_units(body, gait.target_velocity) if follows_commands else np.ones(3)
+    learned_task = task if training is None else training.definition
+    ranges = learned_task.unwrapped.velocity_ranges or [(-1.0, 1.0)] * len(units)
     height = body.torso.standing_height
     return {
         "robot": network.setup.name,
@@ -110,7 +120,8 @@ def describe_machine(network: Network) -> dict[str, Any]:
             "parts": [part for name in history["blocks"] for part in _parts_of_block(task, name)],
         },
         "follows_commands": follows_commands,
-        "command_units": velocity_units(body, gait.target_velocity).tolist() if follows_commands else [1.0, 1.0, 1.0],
+        "command_units": units.tolist(),
+        "command_ranges": (np.array(ranges) * units[:, None]).tolist(),
         "gait_frequency": 0.0 if gait is None else gait.gait_frequency,
         "leak": task.context.leak if follows_commands else 0.0,  # type: ignore[attr-defined]
         "legs": list(_describe_legs(body)),
@@ -202,7 +213,11 @@ def _notes(facts: dict[str, Any]) -> Iterator[str]:
         yield f"held in training, and not moved by run.py: {names}"
     if facts["estimated"]:
         names = ", ".join(_ESTIMATED[name] for name in facts["estimated"])
-        yield f"estimated from the feet that stand: {names}; --set sensors_only=true trains without them"
+        yield f"estimated from the feet that stand: {names}; training saw those of the simulation"
+    if facts["follows_commands"]:
+        ranges = zip(("forward", "left", "turning"), facts["command_ranges"], strict=True)
+        texts = [f"{direction} {low:.2f} to {high:.2f}" for direction, (low, high) in ranges]
+        yield f"commands of training, m/s and rad/s: {', '.join(texts)}; run.py cuts others"
     low, high = facts["delay"]
     if high:
         yield f"delay: trained with {low} to {high} control steps between an action and the motors"

@@ -7,7 +7,7 @@ its yaw, rad.
 
 import dataclasses
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple, Protocol, Self, runtime_checkable
 
 import numpy as np
@@ -133,6 +133,11 @@ class Command(ABC):
     def live(self, body: Body) -> dict[str, int]:
         """Return the sizes of what may be set from outside while an episode runs, by name."""
         return {"command": 3}
+
+    @property
+    def velocity_ranges(self) -> Sequence[tuple[float, float]]:
+        """The least and the greatest desired velocity by direction, in units of the command."""
+        return RANGES
 
     def blocks(self, body: Body) -> dict[str, Block]:
         """Return the blocks that it adds to the observation, by name."""
@@ -267,6 +272,11 @@ class Schedule(Command):
     commands: tuple[tuple[float, float], ...] = RANGES
 
     settings: ClassVar[tuple[str, ...]] = ("commands",)
+
+    @property
+    def velocity_ranges(self) -> Sequence[tuple[float, float]]:
+        """The ranges between which commands are drawn."""
+        return self.commands
 
     def with_settings(self, body: Body, overrides: Mapping[str, Any]) -> Self:
         """Return the schedule with checked ranges in place of its own."""

@@ -11,7 +11,7 @@ the tracking of the command.
 
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -220,6 +220,11 @@ class CommandTask(GaitTask):
         """Sizes of what may be set from outside while an episode runs, by name."""
         body = self.scene.body
         return self.settings.command.live(body) | self._gait.live(body)
+
+    @property
+    def velocity_ranges(self) -> Sequence[tuple[float, float]]:
+        """The least and the greatest desired velocity that episodes draw, in units of the command."""
+        return self.settings.command.velocity_ranges
 
     @property
     def command_limits(self) -> Mapping[str, tuple[np.ndarray, np.ndarray]]:

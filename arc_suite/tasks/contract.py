@@ -30,7 +30,7 @@ import dataclasses
 import functools
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -284,6 +284,14 @@ class Task(Observed):
     def actions(self) -> str:
         """What an action means: the "torque" of a motor, or the "position" of a servo."""
         return "position" if self.scene.body.source else "torque"
+
+    @property
+    def velocity_ranges(self) -> Sequence[tuple[float, float]] | None:
+        """The least and the greatest desired velocity that episodes draw, by direction; None without a command.
+
+        Directions are forward, left and turning, in units of the command.
+        """
+        return None
 
     @property
     def command_limits(self) -> Mapping[str, tuple[np.ndarray, np.ndarray]]:

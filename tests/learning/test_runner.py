@@ -20,7 +20,7 @@ import arc_suite
 from arc_suite import policies, rotations
 from arc_suite.bodies import generator
 from arc_suite.importing import import_robot
-from arc_suite.learning import runner, runner_files
+from arc_suite.learning import onnx_file, runner, runner_files
 from arc_suite.policies import alone
 from arc_suite.policies.network import save
 
@@ -170,6 +170,20 @@ def test_motors_are_in_the_order_of_the_robots_file(tmp_path):
         assert motor["home"] == home[model.joint(motor["joint"]).qposadr[0]]
 
 
+def test_the_delay_is_that_of_training(tmp_path):
+    """A policy's own setup, in which it is judged, has none."""
+    pytest.importorskip("onnx", reason="of the extra learn: make check-agents")
+    network = made(imports.quadruped(), "steer", **SENSED)
+    training = network.setup.with_settings({"delay": [0, 2]})
+    assert runner_files.describe_machine(network)["delay"] == [0, 0]
+    assert runner_files.describe_machine(network, training)["delay"] == [0, 2]
+    onnx_file.save(tmp_path / "policy.onnx", network, training)
+    import onnx
+
+    texts = {entry.key: entry.value for entry in onnx.load(tmp_path / "policy.onnx").metadata_props}
+    assert json.loads(texts["delay"]) == [0, 2]
+
+
 def test_joints_outside_of_the_legs_are_told(tmp_path):
     pytest.importorskip("onnx", reason="of the extra learn: make check-agents")
     notes = runner_files.save(tmp_path, made(imports.with_arm(), **SENSED))
@@ -203,16 +217,20 @@ def test_what_sensors_do_not_give_is_refused(task, settings, line):
 
 
 class Robot:
-    """A robot that follows its targets at once, within its range, and a clock that a sleep moves on."""
+    """A robot that follows its targets at once, within its range, and a clock that a sleep moves on.
+
+    Its gyroscope has noise, as those of robots have.
+    """
 
     def __init__(self, facts, angles):
         self.angles, self.time, self.written, self.quaternion = angles, 10.0, [], np.array((1.0, 0.0, 0.0, 0.0))
         self.low, self.high = ([motor[end] for motor in facts["motors"]] for end in ("low", "high"))
         self.late = 0.0
+        self.noise = np.random.RandomState(0)
 
     def read(self):
         zeros = np.zeros(len(self.angles))
-        return runner.Sensors(self.angles, zeros, self.quaternion, np.zeros(3))
+        return runner.Sensors(self.angles, zeros, self.quaternion, 1e-6 * self.noise.randn(3))
 
     def write(self, output):
         self.written.append(output)
@@ -268,6 +286,45 @@ def test_it_stops_on_limits_and_relaxes(robot, change, line):
     assert robot.play(player, 10) == line
     assert not robot.written[-1].stiffness.any()
     assert len(robot.written) <= 2
+
+
+@pytest.mark.parametrize("repeats", [False, True])
+def test_a_robot_without_new_messages_relaxes(robot, repeats):
+    """Whether reading gives None, or the latest message again; before the first message nothing is written."""
+    player, robot = robot
+    messages = [robot.read() for _ in range(20)]
+    late = messages[-1] if repeats else None
+    robot.read = lambda: messages.pop(0) if messages else late
+    assert robot.play(player, 300) == "no new message of the sensors in 0.1 s"
+    assert len(robot.written) == 20 - 1 + runner.MAX_SILENCE + 1
+    assert not robot.written[-1].stiffness.any()
+    robot.written.clear()
+    robot.read = lambda: None
+    assert robot.play(player, 300) == "no message of the sensors"
+    assert not robot.written
+
+
+def test_a_message_may_be_missing(robot):
+    player, robot = robot
+    read = robot.read
+    numbers = iter(range(1000))
+    robot.read = lambda: None if next(numbers) % 3 == 1 else read()
+    assert robot.play(player, 10) == ""
+    assert len(player.seen) == 10
+
+
+def test_commands_are_cut_to_those_of_training():
+    _, player, _ = machine(imports.quadruped(), "steer", **SENSED, commands={"forward": [-0.2, 1.5]})
+    ranges = np.array(player.facts["command_ranges"])
+    units = np.array(player.facts["command_units"])
+    np.testing.assert_allclose(ranges / units[:, None], [(-0.2, 1.5), (-0.5, 0.5), (-1.0, 1.0)])
+    zeros = np.zeros(12)
+    sensors = runner.Sensors(player.home, zeros, np.array((1.0, 0.0, 0.0, 0.0)), np.zeros(3))
+    observations = []
+    for factor in (1.0, 3.0):
+        player.reset()
+        observations.append(player.observe(sensors, factor * ranges[:, 1]))
+    np.testing.assert_array_equal(*observations)
 
 
 def test_an_interrupt_relaxes_the_motors(robot):
@@ -335,7 +392,8 @@ def test_export_writes_a_folder_that_needs_no_suite(tmp_path):
     assert lines[0] == "wrote robot: policy.onnx, policy.json, run.py; 43 observations"
     assert lines[1] == "motor 0 FR_hip_joint: action 0 r1_joint1"
     assert lines[-1] == "delay: trained with 0 to 2 control steps between an action and the motors"
-    assert len(lines) == 14
+    assert lines[-2].startswith("commands of training, m/s and rad/s: forward -0.")
+    assert len(lines) == 15
     (tmp_path / "arc_suite.py").write_text("raise ImportError('the suite')")
     environ = os.environ | {"PYTHONPATH": str(tmp_path)}
     done = subprocess.run([sys.executable, "robot/run.py"], cwd=tmp_path, env=environ, capture_output=True, text=True)
@@ -344,7 +402,5 @@ def test_export_writes_a_folder_that_needs_no_suite(tmp_path):
     programs.refused(refused, "arc-suite export: --output a.onnx: goes without --runner, which names a folder\n")
     save(tmp_path / "seeing.npz", made("tick", "steer", exclude_blocks="contact_forces"))
     lines = programs.passed(programs.arc_suite("export", "seeing.npz", "--runner=robot", cwd=tmp_path)).splitlines()
-    told = (
-        "estimated from the feet that stand: torso's height, torso's velocity, mean velocity; --set sensors_only=true"
-    )
-    assert lines[-1] == f"{told} trains without them"
+    estimates = "torso's height, torso's velocity, mean velocity"
+    assert lines[-2] == f"estimated from the feet that stand: {estimates}; training saw those of the simulation"

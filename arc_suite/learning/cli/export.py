@@ -41,6 +41,7 @@ from arc_suite.cli.flags import (
 )
 from arc_suite.envs.setup import Setup
 from arc_suite.learning import onnx_file, runner_files
+from arc_suite.learning.agents import configuration, run_folder
 from arc_suite.policies.network import Network
 
 FLAGS = flags.FLAGS
@@ -67,13 +68,14 @@ def main(run: str | None = None) -> None:
     outputs.check_extension(output, [".onnx"])
     files.check_target(FLAGS.output)
     policy = _read_policy(run, name)
+    training = configuration.read(path / run_folder.CONFIG).training_setup if run_folder.is_begun(path) else None
     if FLAGS.runner is not None:
         if FLAGS.output is not None:
             raise ValueError(f"--output {FLAGS.output}: goes without --runner, which names a folder")
-        notes = runner_files.save(FLAGS.runner, policy)
+        notes = runner_files.save(FLAGS.runner, policy, training)
         print(f"wrote {FLAGS.runner}: {', '.join(runner_files.FILES)}; {policy.size} observations", *notes, sep="\n")
         return
-    onnx_file.save(output, policy)
+    onnx_file.save(output, policy, training)
     print(f"wrote {output}: {policy.size} observations, {policy.joints} actions, {output.stat().st_size} bytes")
 
 
