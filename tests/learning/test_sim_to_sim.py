@@ -2,7 +2,11 @@
 
 import importlib.util
 import math
+import re
+import subprocess
+import sys
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 import imports
 import mujoco
@@ -235,3 +239,19 @@ def test_returns_are_the_suites(write, tmp_path):
     assert report.returns.mean > 1.4 * report.zero
     assert returns.mean() == pytest.approx(report.returns.mean, rel=0.02)
     assert difference < 1e-5
+
+
+def play_example(path, folder, *numbers):
+    """Run examples/robot_in_mujoco.py, and return its last line."""
+    program = Path(__file__).parents[2] / "examples" / "robot_in_mujoco.py"
+    command = [sys.executable, str(program), str(path), str(folder), *numbers]
+    return programs.passed(subprocess.run(command, capture_output=True, text=True)).splitlines()[-1]
+
+
+@pytest.mark.parametrize("name", ["go2_like.xml", "a1_like.urdf"])
+def test_the_example_plays_a_policy_on_the_file_of_a_robot(name, tmp_path):
+    """A drawn policy; by a command of 0.2 m/s."""
+    path = imports.FILES / name
+    runner_files.save(tmp_path / "robot", made(str(path), "steer", **SENSED))
+    line = play_example(path, tmp_path / "robot", "0.2", "0", "0")
+    assert re.fullmatch(r"way \d\.\d\d m in (\d+\.\d\d) s; that of the command is (\d\.\d\d) m", line)
