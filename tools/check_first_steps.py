@@ -52,7 +52,7 @@ GOALS = {
     "animator": ("spider.glb", "trained.glb", "spider.fbx", "queen.html", "runs/queen-steer-dagger-0/policy.npz"),
     "designer": ("spider.mp4", "clips.glb", "mantis.json", "brute.json", "gallery/gallery.html", "creature.glb"),
     "roboticist": ("runs/go2/policy.npz", "robot/run.py", "runs/rough/policy.npz", "rough.onnx"),
-    "a clip learned": ("attack.npz", "runs/tick-mimic-ppo-0/policy.npz", "attack.mp4"),
+    "a clip learned": ("limp.npz", "runs/queen-mimic-ppo-0/policy.npz", "limp.mp4"),
 }
 
 MAX_SECONDS = 5400  # of a command, which hangs after that
