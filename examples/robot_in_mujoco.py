@@ -6,7 +6,7 @@ Examples:
   python examples/robot_in_mujoco.py go2.urdf robot 0.2 0 0.3
 
 It needs MuJoCo, NumPy, onnxruntime and the folder of the export. The numbers are the command: forward and left, m/s,
-and turning, rad/s. It prints the way of the robot beside that of the command. For a simulator other than MuJoCo, write
+and turning, rad/s. It prints the way of the robot and that of the command. For a simulator other than MuJoCo, write
 another `Robot`.
 """
 
