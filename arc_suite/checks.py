@@ -573,7 +573,18 @@ def describe_import_error(error: ImportError | SyntaxError, module: str) -> str:
         return quote(f"{error.filename}, line {error.lineno}: {error.msg}")
     if error.name != module:  # the module imports another one, which is missing
         return quote(error)
+    similar_names = difflib.get_close_matches(module, _modules_of_folder(), n=1, cutoff=_SIMILAR_WORD)
+    if similar_names:
+        return f"{quote(error)}{_suggest(repr(similar_names[0]))}"
     return f"{quote(error)}; start in the folder of {module[:_MAX_PATH]}.py, or put it on Python's path"
+
+
+def _modules_of_folder() -> list[str]:
+    """Return the names of the modules in the working directory; none if it cannot be read."""
+    try:
+        return sorted(path.stem for path in Path().glob("*.py"))
+    except OSError:
+        return []
 
 
 def import_object(path: str, subject: str, resolve: Callable[[str], Any] = pkgutil.resolve_name) -> Any:

@@ -157,7 +157,7 @@ def describe_dataset(dataset) -> str:
     returns = [summary["return"] for summary in summaries]
     lengths = [summary["length"] for summary in summaries]
     return (
-        f"{len(dataset)} episodes, return {np.mean(returns):.1f} +- {np.std(returns):.1f}, "
+        f"{len(dataset)} episodes, return {np.mean(returns):.1f}, deviation {np.std(returns):.1f}, "
         f"length {np.mean(lengths):.1f}, {dataset.metadata['dataset_size']} MB in {dataset.path}"
     )
 

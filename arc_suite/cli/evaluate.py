@@ -1,12 +1,13 @@
 """Evaluate a policy: the task's metrics, and return and length of episodes.
 
-Walk's metrics are the mean speed, m/s, and gait compliance, the share of feet as prescribed. IQM is
-the interquartile mean of the return, with a stratified bootstrap interval. `zero` is the return of standing
+Walk's metrics are the mean speed, m/s, and gait compliance, the share of feet as prescribed. `return +- std` has the
+mean and the standard deviation over the episodes. IQM is the interquartile mean of the return, with a stratified
+bootstrap interval; fewer than ten episodes have none, as it would be too narrow. `zero` is the return of standing
 still in the first ten of the episodes. The score is 0 for standing still and 1 for the best demonstrator; that of
 another body, or of other settings, is measured in these ten, too. Where it earns less than a tenth more than standing
-still, a line says so in place of a score. With --preset medium, which is the paper's
-demonstrator, the table ends with the paper's return. A policy that learned from the episodes is refused. The JSON holds
-every episode, and hashes of policy, body, model and task.
+still, a line says so in place of a score. With --preset medium, which is the paper's demonstrator, the table ends with
+the paper's return. A policy that learned from the episodes is refused. The JSON holds every episode, and hashes of
+policy, body, model and task.
 
   arc-suite evaluate --robot all --policy cpg --episodes 10
   arc-suite evaluate --spec spider

@@ -22,7 +22,10 @@ _FORCES = {"exclude_blocks": ["contact_forces"]}
 _FORCE_HINT = "observations have contact forces, unless exclude_blocks names them"
 _FALL = "a fall ends an episode; healthy_range of walk bounds the torso's height, m"
 _CONTROL_STEP = "the control step is that of the body; control_timestep() of arc_suite.load returns it"
+_LIMIT = "the setting time_limit limits episodes, s: steps times control_timestep() of arc_suite.load"
+_LIMIT_NAMES = ("episode_length", "episode_steps", "horizon", "max_episode_length", "max_episode_steps", "max_steps")
 HINTS = {
+    **dict.fromkeys(_LIMIT_NAMES, _LIMIT),
     "control_timestep": _CONTROL_STEP,
     "dt": _CONTROL_STEP,
     "frame_skip": _CONTROL_STEP,

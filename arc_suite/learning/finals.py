@@ -4,11 +4,14 @@ Their seeds follow from the hash of the policy's content, see `evaluation.judgin
 """
 
 import contextlib
-from collections.abc import Mapping, Sequence
+import functools
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
+from tqdm import tqdm
 
 from arc_suite import evaluation, files
 from arc_suite.envs.setup import Setup
@@ -21,10 +24,14 @@ from arc_suite.policies.network import Network
 TABLE = "final"
 COLUMNS = ("policy_sha256", "seed", "return", "length")  # the metrics of the task follow
 
+_NO_BAR = functools.partial(tqdm, disable=True)
+
 Lines = list[dict[str, str]]
 
 
-def play_once(run: Configuration, folder: Path, step: int, threads: int | None = 1) -> Lines:
+def play_once(
+    run: Configuration, folder: Path, step: int, threads: int | None = 1, progress: Callable[..., Any] | None = None
+) -> Lines:
     """Return the rows of the episodes that judge the final policy of a run; play them if nobody has.
 
     Args:
@@ -32,6 +39,7 @@ def play_once(run: Configuration, folder: Path, step: int, threads: int | None =
         folder: folder of the run.
         step: environment step of the policy.
         threads: threads of the simulation; None for as many as there are cores.
+        progress: makes a progress bar of control steps as `tqdm` does; None for no bar.
 
     Raises:
         ValueError: a damaged file.
@@ -41,7 +49,7 @@ def play_once(run: Configuration, folder: Path, step: int, threads: int | None =
     sha256 = network.digest(policy)
     final_lines = run_folder.lines(folder, TABLE)
     if not are_of(final_lines, sha256):
-        final_lines = _play(run.validation, policy, sha256, threads)
+        final_lines = _play(run.validation, policy, sha256, threads, progress or _NO_BAR)
         lines = [",".join(final_lines[0]), *(",".join(row.values()) for row in final_lines)]
         files.write(folder / f"{TABLE}.csv", "\n".join([*lines, ""]))
     return final_lines
@@ -53,14 +61,17 @@ def are_of(final_lines: Sequence[Mapping[str, str]], sha256: str) -> bool:
     return seeds == [(sha256, str(seed)) for seed in judging.seeds_of(sha256)]
 
 
-def _play(setup: Setup, policy: Network, sha256: str, threads: int | None) -> Lines:
+def _play(setup: Setup, policy: Network, sha256: str, threads: int | None, progress: Callable[..., Any]) -> Lines:
     """Play the episodes that judge a policy, and return their rows."""
     seeds = judging.seeds_of(sha256)
     environment = judging.setup_of(setup, seeds).make_vec(
         len(seeds), num_threads=threads, autoreset_mode=AutoresetMode.DISABLED
     )
-    with contextlib.closing(environment):
-        return to_lines(sha256, seeds, evaluation.episodes_in_batch(environment, policy, seeds))
+    description = f"judging in {len(seeds)} episodes"
+    calls = int(np.max(environment.step_limit)) + 1  # of `watch`: one after the reset
+    with contextlib.closing(environment), progress(desc=description, total=calls, unit="step") as bar:
+        episodes = evaluation.episodes_in_batch(environment, policy, seeds, watch=lambda *masks: bar.update())
+    return to_lines(sha256, seeds, episodes)
 
 
 def to_lines(sha256: str, seeds: Sequence[int], episodes: Sequence[evaluation.EpisodeResult]) -> Lines:
@@ -79,4 +90,5 @@ def describe(run: Configuration, final_lines: Sequence[Mapping[str, str]]) -> st
     score = anchors.anchors(run.validation).score(returns.mean())
     score_text = f", score {score:z.2f}" if np.isfinite(score) else ""
     first_seed = final_lines[0]["seed"]
-    return f"judged in {returns.size} episodes, seeds {first_seed} on: {returns.mean():.1f} +- {error:.1f}{score_text}"
+    heading = f"judged in {returns.size} episodes, seeds {first_seed} on"
+    return f"{heading}: return {returns.mean():.1f}, standard error {error:.1f}{score_text}"

@@ -44,9 +44,11 @@ def when(folder: Path, step: int) -> str:
 
 
 def latest_result(run: Configuration, folder: Path) -> str:
-    """Return the return and the score of a run's latest evaluation as text."""
+    """Return the step, the return and the score of a run's latest evaluation as text."""
     table = run_folder.table(folder, "evaluations")
-    return _describe_returns(run, run_folder.latest_returns(table)) if table else "no evaluation yet"
+    if not table:
+        return "no evaluation yet"
+    return _describe_returns(run, run_folder.latest_returns(table), f" at step {int(table['step'][-1])}")
 
 
 def best_run(runs: Sequence[Configuration], folder: Path) -> Configuration | None:
@@ -78,21 +80,25 @@ def mean(runs: Sequence[Configuration], folder: Path) -> str:
     return f"{heading}, {_describe_returns(runs[0], means)}" if means.size else heading
 
 
-def _describe_returns(run: Configuration, returns: np.ndarray) -> str:
+def _describe_returns(run: Configuration, returns: np.ndarray, where: str = "") -> str:
     """Return mean, standard deviation and score of returns as text, with the anchors of the score.
 
-    Anchors stand with their standard errors, after `+-`.
+    Args:
+        run: configuration of a run.
+        returns: the returns.
+        where: what stands after the mean, such as " at step 100".
     """
     mean_return = returns.mean()
     scale = anchors.anchors(run.validation)
-    zero_error, demonstrator_error = (f" +- {error:.1f}" for error in scale.errors) if scale.errors else ("", "")
-    levels = f"standing still {scale.zero:.1f}{zero_error}"
+    levels = f"standing still {scale.zero:.1f}"
     if scale.blind is not None:
         levels += f", blind walker {scale.blind:.1f}"
     if scale.flaw:
         levels += f", no score: {scale.flaw}"
     else:
         score = f"score {scale.score(mean_return):z.2f}"
-        demonstrator = f"demonstrator {scale.preset} {scale.demonstrator:.1f}{demonstrator_error}"
-        levels = f"{score} ({levels}, {demonstrator}, over other seeds)"
-    return f"return {mean_return:.1f}, deviation {returns.std():.1f}, {levels}"
+        levels += f", demonstrator {scale.preset} {scale.demonstrator:.1f}"
+        if scale.errors:
+            levels += ", standard errors {:.1f} and {:.1f}".format(*scale.errors)
+        levels = f"{score} ({levels}, over other seeds)"
+    return f"return {mean_return:.1f}{where}, deviation {returns.std():.1f}, {levels}"

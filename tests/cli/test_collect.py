@@ -30,7 +30,7 @@ def run(*arguments):
 def test_collect_continue_verify_and_minaris_own_command(root):
     out = programs.passed(run("--steps=20", "--episodes=3"))  # no progress bar where nobody watches
     total = sum(summary["return"] for summary in data.open(ID).summaries()) / 3
-    assert out.startswith(f"{ID}: 3 episodes, return {total:.1f} +- ")
+    assert out.startswith(f"{ID}: 3 episodes, return {total:.1f}, deviation ")
     assert out.endswith(f", length 20.0, 0.1 MB in {root / ID}\n")
     assert programs.passed(run("--steps=20", "--episodes=3")) == f"{ID}: has its 3 episodes already\n"
     assert programs.passed(run(f"--verify={ID}")) == f"{ID}: 3 episodes replayed, all bit-equal\n"

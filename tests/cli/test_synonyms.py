@@ -60,6 +60,7 @@ LINES = {
     "evaluate --task=stand": "unknown task 'stand'; did you mean 'walk'? (there are: ",
     "evaluate --task=Stairs": "unknown task 'Stairs'; did you mean 'stairs'? (there are: ",
     "evaluate --set forward_reward_weight=2": f"setting 'forward_reward_weight': {INSTEAD}",
+    "evaluate --set episode_length=200": "setting 'episode_length': the setting time_limit limits episodes, s: steps ",
     "evaluate --set weights=2": 'weights: expected a mapping of names to numbers, such as {"forward": 1.5}, got 2\n',
     "evaluate --set speed=2": "unknown setting of walk 'speed'; did you mean 'target_velocity'? (there are: ",
     "evaluate --speed=2": "unknown flag 'speed'; did you mean --set target_velocity=2?\n",

@@ -32,12 +32,13 @@ def test_when_a_return_was_reached(tmp_path):
     assert outcomes.first_step_above(tmp_path / "none", 0.0) is None
 
 
-def test_plus_and_minus_stand_before_standard_errors_alone(tmp_path):
+def test_each_figure_of_the_latest_evaluation_has_its_name(tmp_path):
     run = Configuration.of(Setup.of("tick", "walk"))
     scale = anchors.anchors(run.setup)
     (tmp_path / "evaluations.csv").write_text("step,return\n100,1000.0\n100,3000.0\n")
     zero_error, best_error = scale.errors
     assert outcomes.latest_result(run, tmp_path) == (
-        f"return 2000.0, deviation 1000.0, score {scale.score(2000.0):.2f} (standing still {scale.zero:.1f} +- "
-        f"{zero_error:.1f}, demonstrator refined {scale.demonstrator:.1f} +- {best_error:.1f}, over other seeds)"
+        f"return 2000.0 at step 100, deviation 1000.0, score {scale.score(2000.0):.2f} (standing still "
+        f"{scale.zero:.1f}, demonstrator refined {scale.demonstrator:.1f}, standard errors {zero_error:.1f} and "
+        f"{best_error:.1f}, over other seeds)"
     )

@@ -143,9 +143,10 @@ def test_policies_from_pythons_path_learn_the_name_of_a_robot_and_the_body_of_an
     ("path", "message"),
     [
         (
-            "own_polices:walk",
-            "No module named 'own_polices'; start in the folder of own_polices.py, or put it on Python's path",
+            "elsewhere:walk",
+            "No module named 'elsewhere'; start in the folder of elsewhere.py, or put it on Python's path",
         ),
+        ("own_polices:walk", "No module named 'own_polices'; did you mean 'own_policies'?"),
         (":walk", "invalid format: ':walk'"),
         ("own_policies:wlak", "module 'own_policies' has no attribute 'wlak'; did you mean 'walk'?"),
         ("own_policies.py:wlak", "module 'own_policies.py' has no attribute 'wlak'; did you mean 'walk'?"),

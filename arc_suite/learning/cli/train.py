@@ -263,7 +263,9 @@ def describe_next_evaluation(run: Configuration, evaluated_step: int) -> str:
 def play_final_episodes(run: Configuration, folder: Path, threads: int | None) -> None:
     """Play the episodes that judge the final policy of a run, and print their result; keep the best one if asked to."""
     step = run_folder.read_progress(folder)["evaluated"]
-    print(f"{folder}: {finals.describe(run, finals.play_once(run, folder, step, threads))}")
+    # The log of one of several seeds ends with its result, without the lines of a bar.
+    bar = progress if FLAGS["seed"].present <= 1 else None
+    print(f"{folder}: {finals.describe(run, finals.play_once(run, folder, step, threads, bar))}")
     if FLAGS.best:
         print(f"{folder}: {best.describe(*best.keep_best(run, folder, threads))}")
 

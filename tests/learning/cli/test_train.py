@@ -30,8 +30,9 @@ for number in ("hidden=16", "batch=8", "start_steps=20", "phase_every=100", "pha
     TINY += ["--hp", number]
 WORDS = f"(there are: {', '.join(registry.robot_words())}, module:name)"
 FINISHED = re.compile(
-    r"runs/tick-walk-sope_eo-0: finished, return \d+\.\d, deviation \d+\.\d, score -?\d\.\d\d "
-    r"\(standing still \d+\.\d \+- \d+\.\d, demonstrator refined \d+\.\d \+- \d+\.\d, over other seeds\)\n"
+    r"runs/tick-walk-sope_eo-0: finished, return \d+\.\d at step 200, deviation \d+\.\d, score -?\d\.\d\d "
+    r"\(standing still \d+\.\d, demonstrator refined \d+\.\d, standard errors \d+\.\d and \d+\.\d, "
+    r"over other seeds\)\n"
 )
 
 
@@ -129,7 +130,8 @@ def test_export_of_what_is_no_run(tmp_path, arguments, message):
 CLIMB = ["--robot=tick", "--algorithm=tiny_studies:climb", "--set", "time_limit=0.2", "--steps=40"]
 CLIMB += ["--evaluate_every=20"]
 REACHED = (
-    r"run: score -100 reached at step 20, after \d+ s \(\d+ s of CPU time\), return \S+, deviation \S+, score \S+ \(.*"
+    r"run: score -100 reached at step 20, after \d+ s \(\d+ s of CPU time\), return \S+ at step 20, deviation \S+, "
+    r"score \S+ \(.*"
 )
 NEXT = ["arc-suite evaluate --policy run", "arc-suite render --policy run -o run.mp4"]
 NEXT.append("arc-suite play --policy run -o run.html" if has_built_pages() else "arc-suite view --policy run")
@@ -151,8 +153,8 @@ def test_until_a_score(tmp_path):
         assert {row["policy_sha256"] for row in finals} == {sha256}
         assert [int(row["seed"]) for row in finals] == list(judging.seeds_of(sha256))
         returns = np.array([float(row["return"]) for row in finals])
-        line = f"run: judged in 100 episodes, seeds {finals[0]['seed']} on: {returns.mean():.1f} +- "
-        assert judged.startswith(f"{line}{returns.std(ddof=1) / 10.0:.1f}, score ")
+        line = f"run: judged in 100 episodes, seeds {finals[0]['seed']} on: return {returns.mean():.1f}, "
+        assert judged.startswith(f"{line}standard error {returns.std(ddof=1) / 10.0:.1f}, score ")
     (tmp_path / "run" / "README.md").unlink()
     done = run("train", *CLIMB, "--minutes=0", "-o", "run", cwd=tmp_path)
     stopped, *following = done.stdout.splitlines()[-5:]
@@ -178,7 +180,7 @@ def test_several_seeds(tmp_path):
     returns = [run_folder.table(tmp_path / "runs" / f"{name}-{seed}", "evaluations")["return"][-10:] for seed in (0, 2)]
     for seed, each in zip((0, 2), returns, strict=True):
         (line,) = (line for line in lines if line.startswith(f"runs/{name}-{seed}: finished"))
-        assert f", return {each.mean():.1f}, deviation {each.std():.1f}, score " in line
+        assert f", return {each.mean():.1f} at step 40, deviation {each.std():.1f}, score " in line
         assert f"runs/{name}-{seed}: judged in 100 episodes, seeds 4" in lines[lines.index(line) + 1]
     means = [each.mean() for each in returns]
     best = f"runs/{name}-{(0, 2)[np.argmax(means)]}"
