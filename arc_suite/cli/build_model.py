@@ -10,6 +10,7 @@ The body is a robot of the suite, a spec file, or one made to order:
   arc-suite build_model --spec spider --summary
   arc-suite build_model --robot tick --task stairs --set difficulty=1 --output stairs.xml
   arc-suite build_model --robot tick --no_arena --output tick.xml
+  arc-suite build_model --legs 8 --torso box --head round --tail long --json --output brute.json
   arc-suite build_model --legs 6 --no_ornaments --json --output plain.json
 """
 
@@ -21,7 +22,7 @@ from absl import flags
 
 from arc_suite import checks, files, models, registry
 from arc_suite.arenas import FLAT, Arena
-from arc_suite.bodies import generator
+from arc_suite.bodies import generator, shaping, torsos
 from arc_suite.bodies.families import sound_body
 from arc_suite.cli import outputs
 from arc_suite.cli.flags import (
@@ -51,6 +52,10 @@ flags.DEFINE_enum(
     "Pairs, left and right, or legs all around; with --legs or --seed. [default: pairs for an even number, or random]",
 )
 flags.DEFINE_float("scale", None, "Multiply all lengths by this and size the body anew.", *generator.SCALE_RANGE)
+for part, forms in torsos.PARTS.items():
+    flags.DEFINE_enum(
+        part, torsos.UNCHANGED, [torsos.UNCHANGED, *forms], f"Form of the {part}, of a body with a plain torso."
+    )
 flags.DEFINE_string("name", None, "Name of the body, of letters a to z, digits and underscores.")
 flags.DEFINE_bool("json", False, "Write the spec instead of the model.")
 flags.DEFINE_bool("visuals", False, "Add decorations without mass or contacts.")
@@ -147,6 +152,7 @@ def _body_from_flags() -> Body:
         body = adjust_body(generator.generate(FLAGS.legs, links, FLAGS.layout))
     if FLAGS.scale is not None:
         body = generator.scaled(body, FLAGS.scale)
+    body = shaping.shaped(body, **{part: FLAGS[part].value for part in torsos.PARTS})
     if FLAGS.no_ornaments:
         body = body.replace(ornaments=False)
     if FLAGS.name is None:

@@ -12,6 +12,10 @@ CURES = {
     **dict.fromkeys(("alsologtostderr", "logtostderr", "stderrthreshold"), _AMOUNT),
     **dict.fromkeys(("deterministic", "stochastic"), "the policy of a run acts by its mean action"),
     **dict.fromkeys(("render", "render_mode"), "arc-suite render films a policy, arc-suite view shows it"),
+    **{
+        part: f"arc-suite build_model --{part} --json writes a spec with it, for --spec"
+        for part in ("head", "tail", "torso")
+    },
     "flagfile": "write its flags into the command; arc-suite train --config takes the configuration of a run",
     "gravity": "environment.change_model sets it, see docs/environments.md",
     "list": "--help lists the names that flags take",
@@ -48,7 +52,7 @@ CURES_OF_PROGRAMS = {
         **dict.fromkeys(("tensorboard", "wandb"), _TRACKERS),
         "robot": "--places takes robots with their tasks, such as tick-walk",
     },
-    "build_model": dict.fromkeys(("ballast", "density", "head", "mass", "tail", "torso"), _FORM_OF_BODIES),
+    "build_model": dict.fromkeys(("ballast", "density", "mass"), _FORM_OF_BODIES),
     "card": dict.fromkeys(("o", "output"), _CARD),
     "check": {"fix": "arc-suite studio --spec FILE has a button for the value that fits"},
     "collect": {

@@ -87,7 +87,8 @@ def refuse_value(error: flags.IllegalFlagValueError) -> None:
     name, _, value = flag_and_value.removeprefix("flag --").partition("=")
     parser = flags.FLAGS[name].parser
     choices = getattr(parser, "enum_values", ("true", "false"))
-    expected = parser.syntactic_help or " or ".join(choices)
+    *others, last = choices
+    expected = parser.syntactic_help or f"{', '.join(others)} or {last}"
     hint = ""
     host, colon, port = value.rpartition(":")
     if name == "port" and colon and port.isdecimal():

@@ -58,6 +58,7 @@ def test_visuals_dump_and_reload_bit_for_bit():
         (["--seed=11", "--legs=4", "--links=1"], sound_body(11, 4, 1)),
         (["--spec", EXAMPLES["spider"]], load_body("spider")),
         (["--robot", EXAMPLES["spider"], "--length=upper=1.2"], shaped(load_body("spider"), links={"upper": 1.2})),
+        (["--legs=6", "--head=round", "--tail=long"], shaped(generator.generate(6, 3), head="round", tail="long")),
         (["--robot=tick", "--scale=2", "--name=flea"], generator.scaled(ROBOTS["tick"], 2.0).replace(name="flea")),
     ],
 )
