@@ -53,9 +53,8 @@ flags.DEFINE_enum(
 )
 flags.DEFINE_float("scale", None, "Multiply all lengths by this and size the body anew.", *generator.SCALE_RANGE)
 for part, forms in torsos.PARTS.items():
-    flags.DEFINE_enum(
-        part, torsos.UNCHANGED, [torsos.UNCHANGED, *forms], f"Form of the {part}, of a body with a plain torso."
-    )
+    part_help = f"Form of the {part}, of a body with a plain torso."
+    flags.DEFINE_enum(part, torsos.UNCHANGED, [torsos.UNCHANGED, *forms], part_help)
 flags.DEFINE_string("name", None, "Name of the body, of letters a to z, digits and underscores.")
 flags.DEFINE_bool("json", False, "Write the spec instead of the model.")
 flags.DEFINE_bool("visuals", False, "Add decorations without mass or contacts.")

@@ -4,6 +4,7 @@ _RESUME = "the same command goes on where it was interrupted"
 _DEVICE = "learners compute on the device of JAX; see docs/gpu.md"
 _WINDOW = "arc-suite view alone opens a window"
 _AMOUNT = "programs have one amount of output; 2>/dev/null hides progress and warnings"
+_FORM = "arc-suite build_model --torso, --head and --tail, with --json, writes a spec for --spec"
 CURES = {
     **dict.fromkeys(("continue", "resume"), _RESUME),
     **dict.fromkeys(("cpu", "cuda", "device", "gpu", "use_gpu"), _DEVICE),
@@ -12,10 +13,7 @@ CURES = {
     **dict.fromkeys(("alsologtostderr", "logtostderr", "stderrthreshold"), _AMOUNT),
     **dict.fromkeys(("deterministic", "stochastic"), "the policy of a run acts by its mean action"),
     **dict.fromkeys(("render", "render_mode"), "arc-suite render films a policy, arc-suite view shows it"),
-    **{
-        part: f"arc-suite build_model --{part} --json writes a spec with it, for --spec"
-        for part in ("head", "tail", "torso")
-    },
+    **dict.fromkeys(("head", "tail", "torso"), _FORM),
     "flagfile": "write its flags into the command; arc-suite train --config takes the configuration of a run",
     "gravity": "environment.change_model sets it, see docs/environments.md",
     "list": "--help lists the names that flags take",
@@ -27,7 +25,7 @@ CURES_OF_OUTPUTS = {"format": "the extension of the output is its format"}
 # Flags whose values a shell changes, unless they are quoted.
 CURES_OF_MISSING_VALUES = {"palette": "a shell drops what follows a #: quote the colors, --palette='#3a5f2b'"}
 
-_FORM_OF_BODIES = "docs/bodies.md: heads, tails and ballast"
+_BALLAST = "docs/bodies.md: heads, tails and ballast"
 _COUNT_OF_BODIES = "--bodies bounds the search"
 _TRACKERS = "arc-suite train has --tensorboard and --wandb, for a run of --config"
 _CHECKPOINTS = "a run saves its policy at each evaluation, see --evaluate_every"
@@ -52,7 +50,7 @@ CURES_OF_PROGRAMS = {
         **dict.fromkeys(("tensorboard", "wandb"), _TRACKERS),
         "robot": "--places takes robots with their tasks, such as tick-walk",
     },
-    "build_model": dict.fromkeys(("ballast", "density", "mass"), _FORM_OF_BODIES),
+    "build_model": dict.fromkeys(("ballast", "density", "mass"), _BALLAST),
     "card": dict.fromkeys(("o", "output"), _CARD),
     "check": {"fix": "arc-suite studio --spec FILE has a button for the value that fits"},
     "collect": {

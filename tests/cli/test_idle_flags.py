@@ -17,7 +17,8 @@ SET = "set task arena"
 COMMON = f"{BODY} {SET} policy vecnormalize preset"
 # Flags by program: each has an effect with any others, or is refused as in a case below or in test_flags.py.
 ALWAYS = {
-    "build_model": "robot spec legs links length palette name output summary render scale seed no_ornaments torso head tail",
+    "build_model": "robot spec legs links length palette name output summary render scale seed no_ornaments torso "
+    "head tail",
     "import": "armature damping forward home output scale stiffness",
     "check": "task tasks walk",
     "render": f"{COMMON} seed steps output".replace(" preset", ""),

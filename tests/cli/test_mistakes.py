@@ -312,7 +312,7 @@ WRONG_CURES = {
     "card tick-walk-ppo-0": "tick-walk-ppo-0: no folder of a run; did you mean runs/tick-walk-ppo-0?\n",
     "card runs/tick-walk-ppo": "runs/tick-walk-ppo: no folder of a run; did you mean runs/tick-walk-ppo-0?\n",
     "build_model --legs 6 --tail=lon": "flag --tail=lon: expected own, short or long\n",
-    "animate --legs 6 --tail long": "unknown flag 'tail'; arc-suite build_model --tail --json writes a spec with it, for",
+    "animate --legs 6 --tail long": "unknown flag 'tail'; arc-suite build_model --torso, --head and --tail, ",
     "build_model --legs 6 --name Krabbo": f"Body.name: {LOWER_CASE}, got 'Krabbo'; did you mean 'krabbo'?\n",
     "style --robot=tick --json=a.csv": "unknown extension '.csv' (there are: .json)\n",
     "style --robot=tick -o a.png": f"--output=a.png: {NO_FOLDER}; arc-suite render writes pictures",
