@@ -10,15 +10,16 @@ import functools
 import hashlib
 import importlib
 import itertools
+import json
 import os
 import pkgutil
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from arc_suite import checks, files
+from arc_suite import checks, files, parsers
 from arc_suite.arenas import ARENAS, Arena, ground_text
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
@@ -112,7 +113,7 @@ def body_of(robot: str | os.PathLike[str] | Body, suggestions: Iterable[str] = (
 
 
 def bodies_of(robot, suggestions: Iterable[str] = ()) -> tuple[Body, ...]:
-    """Return the bodies of `family:first-last`, or of names with commas between; else the one body of `body_of`.
+    """Return the bodies of `family:first-last`, or of names and files with commas between; else the one of `body_of`.
 
     Raises:
         ValueError: as `body_of`, or a range of more than 65536 bodies.
@@ -151,7 +152,9 @@ def robot_words() -> list[str]:
 
 
 def names_several_bodies(robot) -> bool:
-    """Return whether a text names several bodies: `family:first-last`, or names with commas between."""
+    """Return whether a text names several bodies: `family:first-last`, or names and files with commas between."""
+    if isinstance(robot, str) and _is_json_list(robot):
+        return True
     if not isinstance(robot, str) or _is_json(robot) or _is_path(robot):
         return False
     return _MARK_OF_SEVERAL_BODIES.search(robot) is not None
@@ -164,7 +167,9 @@ def check_stored_robot(robot: str) -> str:
         ValueError: an unknown name, or the path of a file.
         NotImported: the module of a name has not been imported yet.
     """
-    for part in _split_names(robot):
+    for part in split_bodies(robot):
+        if _is_json(part):  # has no names
+            continue
         module_or_family, _, _ = part.rpartition(":")
         if not module_or_family or _is_path(part):
             checks.name(part, (*ROBOTS, *EXAMPLES), "robot", suggestions=_family_words())
@@ -176,10 +181,55 @@ def check_stored_robot(robot: str) -> str:
 def names_in_robot(robot: str) -> list[str]:
     """Return the names of robots and families, without seeds, in a text that names bodies."""
     names = []
-    for part in _split_names(robot):
-        family, _, seeds = part.rpartition(":")
-        names.append(family if _SEED_OR_RANGE.fullmatch(seeds) else part)
+    for part in split_bodies(robot):
+        if not _is_json(part):
+            names.append(family_in(part) or part)
     return names
+
+
+def split_bodies(robot: str) -> list[str]:
+    """Return the parts of a text that names bodies: a name, a range, a file, or the JSON of a body.
+
+    Raises:
+        ValueError: a list of JSON that holds anything else.
+    """
+    if _is_json(robot):
+        return [robot]
+    if not _is_json_list(robot):
+        return robot.split(",")
+    with parsers.guard("robot"):
+        parts = json.loads(robot)
+    if not parts or not all(isinstance(part, str) for part in parts):
+        raise ValueError(f"robot {checks.preview(robot)}: expected a list of names and of bodies' texts")
+    return parts
+
+
+def join_bodies(parts: Sequence[str]) -> str:
+    """Return the text that `split_bodies` splits into these parts: a list of JSON if one of them is JSON."""
+    return json.dumps(parts) if any(map(_is_json, parts)) else ",".join(parts)
+
+
+def embed_bodies(robot: str) -> str:
+    """Return a text that names several bodies, with the JSON of bodies in place of their files.
+
+    Raises:
+        ValueError: a file that contains no body.
+        OSError: a file that cannot be read.
+    """
+    return join_bodies(
+        [body_to_json(_read_file(Path(part))) if _is_path(part) else part for part in split_bodies(robot)]
+    )
+
+
+def label_bodies(robot: str) -> str:
+    """Return a text that names several bodies for people: with the name of a body in place of its JSON."""
+    return ",".join(distinct_name(body_from_json(part)) if _is_json(part) else part for part in split_bodies(robot))
+
+
+def family_in(part: str) -> str:
+    """Return the family of `family:seed` or `family:first-last`, as `module:family`, too; "" for another part."""
+    family, _, seeds = part.rpartition(":")
+    return family if _SEED_OR_RANGE.fullmatch(seeds) else ""
 
 
 def family_of(name: str) -> Callable[[int], Body]:
@@ -201,6 +251,9 @@ def _generate_bodies(robot, suggestions: Iterable[str]) -> Iterator[Body]:
         yield robot
     elif _is_json(text):
         yield body_from_json(text)
+    elif _is_json_list(text):
+        for part in split_bodies(text):
+            yield from _generate_bodies(part, suggestions)
     elif is_example:
         yield load_body(EXAMPLES[text])
     elif _is_path(robot) and not _GYMNASIUM_ID.fullmatch(text):
@@ -251,19 +304,25 @@ def _family_words() -> list[str]:
     return [f"{family}:7" for family in FAMILIES]
 
 
-def _split_names(robot: str) -> list[str]:
-    """Return the names in a text that names bodies; a body's JSON contains none."""
-    return [] if _is_json(robot) else robot.split(",")
+def is_file_or_module(word: str) -> bool:
+    """Return whether a word for bodies is a file, or has a module or seeds."""
+    return _is_path(word) or ":" in word
 
 
 def _is_json(text: str) -> bool:
     return text.startswith("{")
 
 
+def _is_json_list(text: str) -> bool:
+    return text.startswith("[")
+
+
 def _is_path(robot) -> bool:
     """Return whether a word stands for a file: by its type, its extension, or a separator of folders."""
     if not isinstance(robot, str):
         return isinstance(robot, os.PathLike)
+    if "," in robot and not os.path.exists(robot):  # several words
+        return False
     path = Path(robot)
     if path.suffix.lower() in (".json", *READERS):
         return True

@@ -52,7 +52,8 @@ class Setup:
     tasks, too.
 
     Attributes:
-        domain: the body, or the text that names several: `family:first-last`, or names with commas.
+        domain: the body, or the text that names several: `family:first-last`, names with commas, or a list of JSON
+            with the texts of bodies that come from files.
         task: name of the task, `module:name` for one of another package; of several tasks the names with commas.
         settings_json: JSON of the task's settings, keys in order.
     """
@@ -93,7 +94,7 @@ class Setup:
         """Return the setup for arguments of `of`, without making several bodies."""
         has_several_bodies = registry.names_several_bodies(domain_name)
         settings = dict(checks.mapping("task_kwargs", task_kwargs))
-        domain = domain_name if has_several_bodies else registry.body_of(domain_name)
+        domain = registry.embed_bodies(domain_name) if has_several_bodies else registry.body_of(domain_name)
         tasks = registry.tasks_of(task_name)
         if len(tasks) > 1 and not has_several_bodies:
             raise ValueError(f"task {checks.preview(task_name)}: expected one with one body, got several")
@@ -153,7 +154,9 @@ class Setup:
     @property
     def _label(self) -> str:
         """Name of the bodies for people."""
-        return self.domain if isinstance(self.domain, str) else registry.distinct_name(self.domain)
+        if isinstance(self.domain, str):
+            return registry.label_bodies(self.domain)
+        return registry.distinct_name(self.domain)
 
     @property
     def task_kwargs(self) -> dict[str, Any]:
@@ -371,14 +374,9 @@ class Setup:
 
 def _validation_bodies(robot: str, count: int) -> str:
     """Return the text that names at most `count` bodies for validation, given the text that names several bodies."""
-    parts = robot.split(",")
-    families = []
-    for part in parts:
-        family, _, _ = part.rpartition(":")
-        if family and family not in families:
-            families.append(family)
-    families = families[:count]
+    parts = registry.split_bodies(robot)
+    families = list(dict.fromkeys(filter(None, map(registry.family_in, parts))))[:count]
     if not families:
-        return ",".join(parts[:count])
+        return registry.join_bodies(parts[:count])
     last_seed = FIRST_VALIDATION_SEED + count // len(families) - 1
     return ",".join(f"{family}:{FIRST_VALIDATION_SEED}-{last_seed}" for family in families)

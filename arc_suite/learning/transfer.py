@@ -14,6 +14,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
+from arc_suite import checks, registry
 from arc_suite.bodies import BodiesEnv, generator
 from arc_suite.bodies.families import sound_body, varied_body
 from arc_suite.evaluation import protocol, walking
@@ -157,10 +158,24 @@ def compare(network: Network, bodies: Iterable[Body], task: str, settings: Mappi
 
 
 def compare_family(name: str, network: Network, task: str, settings: Mapping | None = None) -> list[Comparison]:
-    """Play the episodes of a family of `FAMILIES`; see `compare`."""
-    make_body, count = FAMILIES[name]
-    bodies = [make_body(index) for index in range(count)]
+    """Play the episodes of a family of `FAMILIES`, or of bodies as of `registry.bodies_of`; see `compare`."""
+    bodies = _bodies_of_family(name)
     return compare(network, tqdm(bodies, desc=name, unit="body", leave=False, disable=None), task, settings)
+
+
+def check_family(name: str) -> None:
+    """Raise an error for a word that is neither a family of `FAMILIES` nor a file or `module:name` of a body."""
+    if registry.is_file_or_module(name):
+        registry.bodies_of(name)
+    else:
+        checks.name(name, FAMILIES, "family")
+
+
+def _bodies_of_family(name: str) -> list[Body]:
+    if name not in FAMILIES:
+        return list(registry.bodies_of(name))
+    make_body, count = FAMILIES[name]
+    return [make_body(index) for index in range(count)]
 
 
 def result(comparisons: list[Comparison]) -> TransferResult:

@@ -2,6 +2,7 @@
 
 import json
 import pickle
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -128,8 +129,10 @@ def test_settings_of_a_setup_change_and_go():
     assert Setup.of("queen,tick", "rough").judging() == Setup.of("queen,tick", "rough")
 
 
-def test_names_of_several_bodies():
-    several = ["varied:0-3", "queen,tick", "random:0,varied:1", "module:family:3-4"]
+def test_names_of_several_bodies(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("a,b.json").write_text("{}")
+    several = ["varied:0-3", "queen,tick", "random:0,varied:1", "module:family:3-4", "a.json,queen", "queen,a.json"]
     one = ["varied:7", "queen", "module:family:3", '{"name": "a,b:1-2"}', "a,b.json"]
     assert [name for name in several + one if registry.names_several_bodies(name)] == several
 
@@ -144,6 +147,38 @@ def test_several_bodies_go_into_files_and_come_back():
     assert setup.provenance()["body_sha256"] != Setup.of("random:0-2").provenance()["body_sha256"]
     with pytest.raises(ValueError, match="^robot 'random:0-1,queen': expected one body, got several$"):
         setup.load()
+
+
+def test_bodies_of_files_go_into_files_and_come_back(tmp_path):
+    path = tmp_path / "mine.json"
+    body = registry.body_of("crab").replace(name="mine")
+    path.write_text(body_to_json(body))
+    setup = Setup.of(f"{path},queen,varied:0-1", "steer", SHORT)
+    path.unlink()
+    assert [body.name for body in setup.bodies] == ["mine", "queen", "varied_0", "varied_1"] and setup.bodies[0] == body
+    assert setup.name == "mine+queen+varied.0-1" and str(setup).startswith("mine,queen,varied:0-1, steer, ")
+    assert Setup.from_dict(setup.to_dict()) == setup == setup.with_settings({})
+    assert setup.validation(10).robot == "varied:100000-100009"
+    with pytest.raises(OSError, match=r"^cannot read .*none\.json: no such file or directory$"):
+        Setup.of(f"queen,{tmp_path / 'none.json'}")
+    for text in ("[1]", "[]", "[", '["queen", {}]'):
+        with pytest.raises(ValueError, match="^robot"):
+            Setup.from_dict(setup.to_dict() | {"robot": text})
+
+
+def test_a_list_of_files_alone_is_validated_by_its_first_bodies(tmp_path):
+    for name in ("first", "second"):
+        (tmp_path / f"{name}.json").write_text(body_to_json(registry.body_of("crab").replace(name=name)))
+    setup = Setup.of(f"{tmp_path / 'first.json'},{tmp_path / 'second.json'}")
+    assert [body.name for body in setup.validation(1).bodies] == ["first"]
+
+
+def test_names_of_other_packages_are_no_families(monkeypatch):
+    body = registry.body_of("crab").replace(name="mine")
+    monkeypatch.setitem(registry.ROBOTS, "mine", body)
+    monkeypatch.setitem(registry.MODULE_OF_NAME, ("robot", "mine"), __name__)
+    setup = Setup.of(f"{__name__}:mine,queen")
+    assert setup.bodies[0] == body and setup.validation(10) == setup
 
 
 def test_bodies_of_validation_are_of_other_seeds():

@@ -10,7 +10,7 @@ Families: random and varied, 50 bodies of seeds that no run trains with; the fou
 mutants of them; and 10 random bodies a quarter, and ten times, as large.
 
   arc-suite transfer --policy runs/varied.0-127-walk-dagger_bodies-0
-  arc-suite transfer --policy universal --task steer --families varied,robots -o bodies.csv
+  arc-suite transfer --policy universal --task steer --families varied,robots,pacer.json -o bodies.csv
 """
 
 from pathlib import Path
@@ -27,7 +27,7 @@ from arc_suite.learning.studies import bodies
 FLAGS = flags.FLAGS
 define_task()
 flags.DEFINE_string("policy", "universal", "Folder of a run of many bodies, a policy file, or universal.")
-flags.DEFINE_list("families", list(transfer.FAMILIES), "Families to play with.")
+flags.DEFINE_list("families", list(transfer.FAMILIES), "Families to play with, or files or module:name of bodies.")
 flags.DEFINE_string("output", None, "Table to add every episode to, CSV; those of before are replaced.", short_name="o")
 flags.DEFINE_string("name", None, "Of the policy in this table. [default: the stem of its path]")
 
@@ -43,7 +43,7 @@ def main() -> None:
     if FLAGS.families == ["all"]:
         raise ValueError("--families=all: without the flag, all families play")
     for family in FLAGS.families:
-        checks.name(family, transfer.FAMILIES, "family")
+        transfer.check_family(family)
     if FLAGS.output:
         checks.extension(FLAGS.output, [".csv"])
         files.check_target(FLAGS.output)

@@ -46,6 +46,7 @@ def test_a_row_for_each_family_and_a_table_of_episodes(policy, tmp_path):
     ("arguments", "message"),
     [
         (["--families=robts"], "unknown family 'robts'; did you mean 'robots'?"),
+        (["--families=robots,none.json"], "cannot read none.json: no such file or directory"),
         (["--policy=nowhere.npz"], "cannot read nowhere.npz: no such file"),
         (["-o", "table.txt"], "unknown extension '.txt' (there are: .csv)"),
         (["--task=wlak"], "unknown task 'wlak'; did you mean 'walk'?"),
