@@ -274,6 +274,19 @@ def suggest_extension(text: str, extensions: Iterable[str]) -> str:
     return ""
 
 
+def suggest_similar_file(text: str, extensions: Iterable[str]) -> str:
+    """Return the part of an error on a name that suggests a file of a similar name with an extension; "" for none."""
+    path = Path(text)
+    extension_of_stem = {
+        entry.removesuffix(extension): extension
+        for extension in extensions
+        for entry in _list_folder(path.parent)
+        if entry.endswith(extension)
+    }
+    matches = difflib.get_close_matches(path.name, extension_of_stem, n=1, cutoff=_LEAST_SIMILARITY)
+    return f"; did you mean {path.parent / (matches[0] + extension_of_stem[matches[0]])}?" if matches else ""
+
+
 def suggest_path(path: str | os.PathLike[str]) -> str:
     """Return the part of an error on a missing path that suggests one of a similar name; "" for none.
 
@@ -282,12 +295,16 @@ def suggest_path(path: str | os.PathLike[str]) -> str:
     if is_address(os.fspath(path)):
         return f"; {ADDRESS_CURE}"
     path = Path(path)
-    try:
-        names = [entry.name for entry in itertools.islice(path.parent.iterdir(), _MAX_ENTRIES)]
-    except (OSError, ValueError):  # no folder, or the text is no path
-        return ""
-    matches = difflib.get_close_matches(path.name, names, n=1, cutoff=_LEAST_SIMILARITY)
+    matches = difflib.get_close_matches(path.name, _list_folder(path.parent), n=1, cutoff=_LEAST_SIMILARITY)
     return f"; did you mean {path.parent / matches[0]}?" if matches else ""
+
+
+def _list_folder(path: Path) -> list[str]:
+    """Return the first names in a folder; none if there is no such folder, or the path is none."""
+    try:
+        return [entry.name for entry in itertools.islice(path.iterdir(), _MAX_ENTRIES)]
+    except (OSError, ValueError):
+        return []
 
 
 def read_bytes(path: str | os.PathLike[str], max_bytes: int) -> bytes:

@@ -12,7 +12,7 @@ import numpy as np
 
 from arc_suite import checks, files, parsers, rotations
 from arc_suite.motions.motion import MAX_FRAMES
-from arc_suite.motions.skeletons import FROM_Y_UP, LOOP_SUFFIX, Skeleton
+from arc_suite.motions.skeletons import FROM_Y_UP, LOOP_SUFFIX, Skeleton, clip_of_animation
 
 EXTENSION = ".glb"
 FRAME_RATE = 60.0  # Hz, at which animations are sampled
@@ -23,7 +23,6 @@ _MAX_DEPTH = 256  # of nodes below each other
 _MAX_ANIMATIONS = 1024
 _MAX_VALUES = 1 << 26  # numbers of sampled poses: frames times nodes times 16
 _TIME_TOLERANCE = 1e-5  # s
-_IN_PLACE_SUFFIX = "_in_place"
 
 _MAGIC = b"glTF"
 _JSON_CHUNK = 0x4E4F534A
@@ -381,7 +380,7 @@ def _make_skeleton(
     if not (np.isfinite(scales) & (scales > 1e-9)).all():
         raise ValueError("expected poses without mirrors and scales of 0")
     return Skeleton(
-        name=name.removesuffix(LOOP_SUFFIX).removesuffix(_IN_PLACE_SUFFIX) or name,
+        name=clip_of_animation(name),
         frame_rate=(len(poses) - 1) / seconds if seconds > 0.0 else FRAME_RATE,
         loops=loops,
         bones=tuple([str(nodes[joint].get("name", "")) for joint in joints]),

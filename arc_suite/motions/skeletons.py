@@ -17,6 +17,7 @@ from arc_suite.robots.spec import Body
 # From axes with y up and z ahead, as of glTF, to those of the suite, x ahead and z up.
 FROM_Y_UP = np.array(((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
 LOOP_SUFFIX = "_loop"  # of the names of animations that repeat
+_IN_PLACE_SUFFIX = "_in_place"  # of the names of animations whose root stays although the clip moves
 # From what these make of axes with z up and -y ahead, as of Blender.
 _FROM_Z_UP = np.array(((0.0, 0.0, -1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)))
 _MIN_UPRIGHT = 0.7  # cosine of the torso's tilt in the bound pose
@@ -101,6 +102,11 @@ class _BindPose(NamedTuple):
     orientation: np.ndarray
     position: np.ndarray
     angles: np.ndarray
+
+
+def clip_of_animation(name: str) -> str:
+    """Return the name of the clip of an animation, as `arc-suite animate` names animations after clips."""
+    return name.removesuffix(LOOP_SUFFIX).removesuffix(_IN_PLACE_SUFFIX) or name
 
 
 def fit_skeleton(body: Body, skeleton: Skeleton) -> tuple[Motion, list[str]]:

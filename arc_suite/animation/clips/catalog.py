@@ -11,6 +11,7 @@ from arc_suite.animation.clips import acting, gestures, getting_up
 from arc_suite.animation.clips.blows import DIRECTIONS
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose
 from arc_suite.motions import motion_files
+from arc_suite.motions.skeletons import clip_of_animation
 from arc_suite.robots.gaits import PACES, Pace
 from arc_suite.robots.spec import Body
 
@@ -197,6 +198,9 @@ def clip_of(name: str) -> Kind:
     file_cure = files.suggest_extension(name, (motion_files.EXTENSION,)) if is_unknown else ""
     if file_cure:
         raise ValueError(f"unknown clip {checks.preview(name)}{file_cure}")
+    clip_of_same_animation = clip_of_animation(name)
+    if is_unknown and clip_of_same_animation in clip_names():
+        raise ValueError(f"unknown clip {checks.preview(name)}; did you mean {clip_of_same_animation!r}?")
     clip = registry.find("clip", name, CLIPS)
     if not isinstance(clip, Kind):
         kinds = ", ".join(kind.__name__ for kind in get_args(Kind))

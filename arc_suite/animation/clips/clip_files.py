@@ -20,6 +20,7 @@ from arc_suite.animation.clips.motion_of_clip import clip_of_motion, motion_of_c
 from arc_suite.envs.setup import Setup
 from arc_suite.models.visuals.scene import MAX_HEIGHT
 from arc_suite.motions import motion_files
+from arc_suite.motions.skeletons import clip_of_animation
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import films
 
@@ -76,8 +77,8 @@ def animate(
     Args:
         robot, task, task_kwargs: see `arc_suite.load`.
         path: path of the file.
-        clips: names of `CLIPS`, `module:name` of clips of other packages, or files of motions of the body, `.npz`;
-            one or several; or "all".
+        clips: names of `CLIPS`, `module:name` of clips of other packages, or files of motions of the body, `.npz`,
+            whose names their clips have; one or several; or "all".
         policy, preset, fps, straight, plant, weight: see `clips.clips`.
         progress: wraps what takes long, as `tqdm` does.
         options: options of a `.glb`, `rig`, `root_motion`, `triangles`, `uv` and `reduce`, see `creatures.glb`; of
@@ -99,7 +100,7 @@ def animate(
         if names == [ALL]:
             names = catalog.clip_names()
         catalog_names = [name for name in names if not _is_motion(name)]
-        made_clips = [clip_of_motion(setup.body, motions.load(name), fps) for name in names if _is_motion(name)]
+        made_clips = [_read_clip(setup.body, name, fps) for name in names if _is_motion(name)]
         if catalog_names or not names:
             made_clips += make_clips(
                 setup, catalog_names, policy, preset, fps, recording_progress, straight, plant, weight
@@ -126,6 +127,11 @@ def _is_motion(name: str) -> bool:
     return name.lower().endswith(motion_files.EXTENSION)
 
 
+def _read_clip(body: Body, path: str, fps: float) -> Clip:
+    """Return the motion of a file as a clip, with the name of the file: users edit and rename copies of one clip."""
+    return clip_of_motion(body, motions.load(path), fps)._replace(name=clip_of_animation(Path(path).stem))
+
+
 def _check_names(clips: Sequence[Clip]) -> None:
     """Check that clips have different names.
 
@@ -134,7 +140,8 @@ def _check_names(clips: Sequence[Clip]) -> None:
     """
     names = [clip.name for clip in clips]
     if len(set(names)) < len(names):
-        raise ValueError(f"clips: expected each name once, got {', '.join(names)}")
+        cure = f"a clip of a motion has the name of its {motion_files.EXTENSION}: rename the file"
+        raise ValueError(f"clips: expected each name once, got {', '.join(names)}; {cure}")
 
 
 def metrics_file(path: str | os.PathLike) -> Path | None:

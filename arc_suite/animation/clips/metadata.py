@@ -22,16 +22,18 @@ class _BlendSpace(NamedTuple):
 
     Attributes:
         axes: names of the speeds in the metadata of clips.
-        zero_component: index of the component of a clip's command that is 0 in this plane.
+        side_component: index of the component of a clip's command along the first axis.
+        zero_component: index of the component that is 0 in this plane.
     """
 
     axes: tuple[str, str]
+    side_component: int
     zero_component: int
 
 
 _BLEND_SPACES = {
-    "turning": _BlendSpace(axes=("turn_rate", "forward_speed"), zero_component=1),
-    "strafing": _BlendSpace(axes=("left_speed", "forward_speed"), zero_component=2),
+    "turning": _BlendSpace(axes=("turn_rate", "forward_speed"), side_component=2, zero_component=1),
+    "strafing": _BlendSpace(axes=("left_speed", "forward_speed"), side_component=1, zero_component=2),
 }
 
 
@@ -156,22 +158,32 @@ def name_animations(clip: Clip, roots_move: Sequence[bool]) -> dict[str, bool]:
 
 
 def _make_blend_spaces(clips: Sequence[Clip], roots_move: Sequence[bool]) -> dict[str, Any]:
-    """Return the points of blend spaces: an animation for each point in the plane of two speeds."""
+    """Return the points of blend spaces: an animation for each point in the plane of two speeds.
+
+    A plane is left out if all clips in it go straight ahead: engines make triangles of the points, and these would lie
+    on a line.
+    """
     spaces = {}
     for name, space in _BLEND_SPACES.items():
         points = []
+        commands_to_sides = []
         for clip in clips:
-            if clip.name == "idle" or _is_sound_walk(clip, space.zero_component):
+            command = _command_of_point(clip)
+            if command is not None and command[space.zero_component] == 0.0:
                 first_animation, *_ = name_animations(clip, roots_move)
                 metadata = clip_metadata(clip)
                 points.append({"animation": first_animation, "at": [metadata[axis] for axis in space.axes]})
-        spaces[name] = {"axes": list(space.axes), "points": points}
+                commands_to_sides.append(command[space.side_component])
+        if any(commands_to_sides):
+            spaces[name] = {"axes": list(space.axes), "points": points}
     return spaces
 
 
-def _is_sound_walk(clip: Clip, zero_component: int) -> bool:
-    """Return whether a clip is a walk of a sound body with a component of its command at 0."""
+def _command_of_point(clip: Clip) -> tuple[float, float, float] | None:
+    """Return the command of a walk of a sound body, and that of idle, 0; None for clips that are no points."""
+    if clip.name == "idle":
+        return 0.0, 0.0, 0.0
     if clip.name not in clip_names():  # of a file
-        return False
+        return None
     kind = clip_of(clip.name)
-    return isinstance(kind, WalkLoop) and kind.failing is None and kind.command[zero_component] == 0.0
+    return kind.command if isinstance(kind, WalkLoop) and kind.failing is None else None

@@ -385,17 +385,26 @@ def test_clips_connect_and_last_whole_frames(robot):
             np.testing.assert_allclose(one, other, atol=1e-6)
 
 
+@pytest.mark.slow
+def test_a_blend_space_has_clips_to_a_side():
+    walk, idle = made("tick")["walk"], made("tick")["idle"]
+    clips = [walk, walk._replace(name="strafe_left"), idle]
+    points = export.sidecar(ROBOTS["tick"], clips)["blend"]["strafing"]["points"]
+    assert [point["animation"] for point in points] == ["walk_loop", "strafe_left_loop", "idle_loop"]
+    assert export.sidecar(ROBOTS["tick"], [walk, idle])["blend"] == {}
+
+
 @pytest.mark.parametrize("robot", EACH)
 def test_the_sidecar_has_blend_spaces_and_tells_missing_steps(robot):
     body, clips = ROBOTS[robot], list(made(robot).values())
     told = export.sidecar(body, clips)
-    for space, axis in (("turning", "turn_rate"), ("strafing", "left_speed")):
-        assert told["blend"][space]["axes"] == [axis, "forward_speed"]
-        for point in told["blend"][space]["points"]:
-            figures = told["clips"][point["animation"]]
-            assert point["at"] == [figures[axis], figures["forward_speed"]]
-    names = {space: [each["animation"] for each in found["points"]] for space, found in told["blend"].items()}
-    assert names == {"turning": ["walk_loop", "turn_left_loop", "idle_loop"], "strafing": ["walk_loop", "idle_loop"]}
+    plane = told["blend"]["turning"]
+    assert plane["axes"] == ["turn_rate", "forward_speed"]
+    for point in plane["points"]:
+        figures = told["clips"][point["animation"]]
+        assert point["at"] == [figures["turn_rate"], figures["forward_speed"]]
+    assert [point["animation"] for point in plane["points"]] == ["walk_loop", "turn_left_loop", "idle_loop"]
+    assert list(told["blend"]) == ["turning"]  # without clips to a side the points of the other plane lie on a line
     assert told["clips"]["walk_loop"]["missing_steps"] == {}
     walk = made(robot)["walk"]
     lame = walk._replace(foot_contacts=tuple(e for e in walk.foot_contacts if e.foot != body.foot_names[1]))
