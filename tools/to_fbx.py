@@ -3,6 +3,8 @@
 Needs Blender's `bpy` in an environment of its own, for Python 3.11:
   tools/ensure_venv.sh .venv-blender && .venv-blender/bin/python -m pip install bpy==5.0.1
   .venv-blender/bin/python tools/to_fbx.py queen.glb queen.fbx
+Blender 5 itself runs the program, too:
+  blender --background --python tools/to_fbx.py -- queen.glb queen.fbx
 
 The extension of the second file says what is written:
   .fbx    all clips as takes under their names, at scale 1, without leaf bones; foot contacts are a property
@@ -48,7 +50,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("glb", type=pathlib.Path)
     parser.add_argument("output", type=pathlib.Path)
-    parsed = parser.parse_args(arguments)
+    parsed = parser.parse_args(program_arguments(sys.argv) if arguments is None else arguments)
     try:
         for path in convert(parsed.glb, parsed.output):
             print(f"wrote {path}")
@@ -56,6 +58,11 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(f"to_fbx: {error.filename}: {(error.strerror or 'cannot be read').lower()}")
     except ValueError as error:
         sys.exit(f"to_fbx: {error}")
+
+
+def program_arguments(command: list[str]) -> list[str]:
+    """Return the arguments of this program in a command, which Blender's arguments and -- may precede."""
+    return command[command.index("--") + 1 :] if "--" in command else command[1:]
 
 
 def convert(glb: pathlib.Path, output: pathlib.Path) -> list[pathlib.Path]:

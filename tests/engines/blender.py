@@ -28,6 +28,8 @@ def main(folder: str) -> None:
     files = sorted(pathlib.Path(folder).glob("*-skin.glb"))
     assert files
     refusals(files[0])
+    command_of_blender = ["blender", "--background", "--python", "tools/to_fbx.py", "--", "a.glb", "a.fbx"]
+    assert to_fbx.program_arguments(command_of_blender) == ["a.glb", "a.fbx"]
     for path in files:
         name = path.name.removesuffix("-skin.glb")
         truth = dict(np.load(path.with_name(f"{name}.npz")))
