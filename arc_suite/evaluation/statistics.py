@@ -231,7 +231,10 @@ def _samples(name: str, strata: Sequence[Sequence[float]]) -> list[np.ndarray]:
         raise ValueError(f"{name}: expected at least one stratum, got none")
     for number, values in enumerate(samples):
         if values.ndim != 1 or not values.size or np.isnan(values).any():
-            raise ValueError(f"{name}[{number}]: expected one number or more for each stratum, got {values.tolist()}")
+            cure = "; numbers of one stratum are a list in a list" if values.ndim == 0 else ""
+            raise ValueError(
+                f"{name}[{number}]: expected one number or more for each stratum, got {values.tolist()}{cure}"
+            )
     return samples
 
 

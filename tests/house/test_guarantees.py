@@ -56,8 +56,13 @@ TESTS = {
         "envs/test_vector.py::test_calls_at_the_wrong_time",
     ],
     "dm_env: it is a reset.": [f"{HERE}::test_a_step_of_a_dm_env_without_an_episode_is_a_reset"],
-    "Integers from 0 to 2**32 - 1: below 10,000 for evaluation, below 100,000 for datasets, then for learning, and "
-    "from 4,100,000,000 on for judging.": [f"{HERE}::test_seeds_and_their_ranges"],
+    "Seeds are integers from 0 to 2**32 - 1.": [f"{HERE}::test_seeds_and_their_ranges"],
+    "Evaluation has those below 10,000, and datasets the next, below 100,000.": [
+        f"{HERE}::test_seeds_and_their_ranges"
+    ],
+    "Learning has those from 100,000 on, and judging those from 4,100,000,000 on.": [
+        f"{HERE}::test_seeds_and_their_ranges"
+    ],
     "Evaluation refuses a policy whose file says that it learned from these episodes.": [
         "evaluation/test_memory.py::test_episodes_that_a_policy_learned_from_do_not_judge_it"
     ],
@@ -73,6 +78,10 @@ TESTS = {
     "Resets without a seed continue the random stream.": [
         "envs/test_gym.py::test_np_random_is_the_stream_of_resets",
         "envs/test_gym.py::test_seeds_of_all_kinds",
+    ],
+    "On the processor, the same `arc-suite train` command on one machine gives a bit-identical policy and table of "
+    "evaluations, on any number of `--threads`.": [
+        "learning/cli/test_train.py::test_the_same_command_learns_the_same_bits_on_any_number_of_threads"
     ],
     "Pickles and deep copies in mid-episode continue bit-identically.": [
         "envs/test_gym.py::test_copies_carry_on_bit_for_bit",

@@ -32,11 +32,14 @@ def test_its_policy_plays_and_earns_what_its_folder_says(tmp_path):
 
 def test_the_code_of_the_page(monkeypatch):
     page = pathlib.Path(__file__).parents[2] / "docs" / "agents.md"
-    (block,) = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
+    blocks = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
     monkeypatch.setattr(learning, "train", lambda robot, minutes: train(steps=20, minutes=minutes))
     names = {}
-    exec(compile(block, str(page), "exec"), names)
+    for block in blocks:
+        exec(compile(block, str(page), "exec"), names)
     assert np.isfinite(names["earned"])
+    assert names["info"]["progress_speed"] > 0.3  # m/s, of the packaged policy
+    assert names["low"] < names["mean"] < names["high"]
 
 
 def test_without_a_folder_nothing_stays(monkeypatch, tmp_path):

@@ -16,7 +16,8 @@ checkpoint, the policy, and a picture of its returns, drawn anew after each eval
   arc-suite train --config runs/queen-sope/config.json -o runs/queen-sope-again
   arc-suite train --robot varied:0-127 --algorithm dagger_bodies
 
-A run ends with the commands that score, film and play its policy. Of several seeds, it is the best one.
+A run ends with 100 episodes that judge its policy; Ctrl-C skips them, and the same command plays them later. Then come
+the commands that score, film and play the policy. Of several seeds, it is the best one.
 """
 
 import contextlib

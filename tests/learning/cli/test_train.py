@@ -193,6 +193,20 @@ def test_several_seeds(tmp_path):
     assert tables[0] == tables[1]
 
 
+@pytest.mark.slow
+@pytest.mark.skipif(not HAS_JAX, reason="of the extra learn: make check-agents")
+def test_the_same_command_learns_the_same_bits_on_any_number_of_threads(tmp_path):
+    short = ["--robot=tick", "--set", "time_limit=2", "--steps=256", "--evaluate_every=128"]
+    for number in ("num_envs=8", "horizon=16", "minibatch=32", "hidden=16"):
+        short += ["--hp", number]
+    for threads in "12":
+        done = run("train", *short, f"--threads={threads}", "-o", threads, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+    assert policies.digest(str(tmp_path / "1")) == policies.digest(str(tmp_path / "2"))
+    for table in ("evaluations.csv", "training.csv", "final.csv"):
+        assert (tmp_path / "1" / table).read_bytes() == (tmp_path / "2" / table).read_bytes()
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """That of a run, which one command has trained."""
