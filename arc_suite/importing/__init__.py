@@ -109,7 +109,7 @@ def import_robot(
         path: path of the file.
         home: name of the keyframe in which it stands, or angles of its joints, rad, such as "*_thigh=0.8,*_calf=-1.5":
             other joints are at zero, or at the nearest angle of their range; None to find a pose.
-        feet: names of bodies or geoms at the ends of its legs; none to find them.
+        feet: names of bodies or geoms at the ends of its legs, or of links fixed to them; none to find them.
         armature: rotor inertia of each joint for which the file has none, kg m^2; None for none, or for a small one
             where joints buzz without it.
         forward: axis of the file's torso that points ahead, out of `facing.AXES`; None for x, or for another one where
@@ -237,7 +237,8 @@ def _open_standing_robot(path: Path, choices: _Choices, facing: Facing) -> _Stan
     feet = trunk.find_feet(robot)
     robot = drives.release_joints(robot, file.driven)
     loops.check_legs(robot, feet)
-    stance = poses.find_stance(robot, choices.home, choices.feet)
+    named_feet = [file.carriers.get(foot, foot) for foot in choices.feet]
+    stance = poses.find_stance(robot, choices.home, named_feet)
     loops.check_legs(robot, [leg.body for leg in stance.legs])
     return _StandingRobot(file, robot, stance)
 

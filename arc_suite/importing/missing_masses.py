@@ -22,7 +22,7 @@ def describe_links(links: Mapping[str, ElementTree.Element]) -> Iterator[str]:
         text = f"masses: {len(solid)} links with colliders have none in the file, and get 1000 kg/m^3"
         yield f"{text} ({checks.join_first(solid)})"
     if empty:
-        text = f"masses: {len(empty)} links have none in the file and no collider: none here"
+        text = f"masses: {len(empty)} links have no mass and no collider in the file, and weigh nothing here"
         yield f"{text} ({checks.join_first(empty)})"
 
 

@@ -141,7 +141,7 @@ def find_motors(
         *_mirror_notes(robot, stance.joints),
         *_range_notes(robot, gains_of_file),
         *_delay_notes(stance.joints, servos),
-        _gain_note(stance.joints, gains_of_file, stiffness, damping),
+        _gain_note(stance.joints, servos, gains_of_file, stiffness, damping),
     )
     return Motors(servos, all_notes)
 
@@ -357,18 +357,25 @@ def format_span(low: float, high: float) -> str:
 
 def _gain_note(
     joints_of_legs: Sequence[int],
+    servos: dict[int, Servo],
     gains_of_file: dict[int, _Gains],
     stiffness: float | None,
     damping: float | None,
 ) -> str:
     """Return a line on where the gains of the legs' servos come from; gains that a user chose are not None."""
-    count = sum(joint in gains_of_file for joint in joints_of_legs)
-    others_text = "the others are sized"
-    chosen_texts = []
-    if stiffness is not None:
-        chosen_texts.append(f"a stiffness of {stiffness:g} N m/rad")
-    if damping is not None:
-        chosen_texts.append(f"a damping of {damping:g} N m s/rad")
-    if chosen_texts:
-        others_text = f"the others have {' and '.join(chosen_texts)}"
-    return f"gains: {count} of {len(joints_of_legs)} servos have those of the file's position actuators, {others_text}"
+    sized_servos = [servos[joint] for joint in joints_of_legs if joint not in gains_of_file]
+    count = len(joints_of_legs) - len(sized_servos)
+    if not sized_servos:
+        return "gains: all servos have those of the file's position actuators"
+    stiffness_span = format_span(*_bounds([servo.stiffness for servo in sized_servos]))
+    damping_span = format_span(*_bounds([servo.damping for servo in sized_servos]))
+    stiffness_text = f"{'sized' if stiffness is None else 'chosen'} stiffness {stiffness_span} N m/rad"
+    damping_text = f"{'sized' if damping is None else 'chosen'} damping {damping_span} N m s/rad"
+    place = "none in the file"
+    if count:
+        place = f"{count} of {len(joints_of_legs)} servos have those of the file's position actuators, the others"
+    return f"gains: {place}: {stiffness_text}, {damping_text}"
+
+
+def _bounds(values: Sequence[float]) -> tuple[float, float]:
+    return min(values), max(values)

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import mujoco
 import numpy as np
 
+from arc_suite import checks
 from arc_suite.importing import drives, loops, trunk, visual_meshes
 from arc_suite.importing.motors import format_span
 from arc_suite.importing.naming import Names
@@ -15,7 +16,6 @@ from arc_suite.models.standing import GRAVITY
 
 _MAX_GRAVITY_DIFFERENCE = 0.05  # of the suite's gravity, without a note
 _BIPED = ": a biped, which no demonstrator walks"
-_MAX_NAMES = 4  # of joints in one note
 _MAX_SLOPE = 0.01  # degrees, of a floor that counts as level
 
 
@@ -31,7 +31,8 @@ def import_notes(robot: Robot, stance: Stance, names: Names, order: Sequence[int
     joint_counts = sorted({len(leg.joints) for leg in stance.legs})
     counts_text = " or ".join(map(str, joint_counts))
     kind = _BIPED if len(stance.legs) == 2 else ""
-    yield f"legs: {len(stance.legs)} ({', '.join(names.legs)}), {counts_text} joints each{kind}"
+    noun = "joint" if joint_counts == [1] else "joints"
+    yield f"legs: {len(stance.legs)} ({', '.join(names.legs)}), {counts_text} {noun} each{kind}"
     pairs = ", ".join(f"{robot.joint_name(joint)} {names.joints[joint]}" for joint in order)
     yield f"joints in the file's order, each with its name in the suite: {pairs}"
     action_indices = [stance.joints.index(joint) for joint in order]
@@ -93,13 +94,13 @@ def omission_notes(file: RobotFile, robot: Robot, stance: Stance, names: Names) 
     gravity = float(np.linalg.norm(model.opt.gravity))
     if abs(gravity - GRAVITY) > _MAX_GRAVITY_DIFFERENCE * GRAVITY:
         yield f"units: the file's gravity is {gravity:g}; speeds and times of the tasks count on {GRAVITY:g} m/s^2"
-    yield from _loop_notes(robot, stance)
+    yield from _loop_notes(file, robot, stance)
     if names.held:
         held_names = _name_joints(robot, names.held)
         yield f"held: {len(names.held)} joints outside of the legs stay in the standing pose ({held_names})"
 
 
-def _loop_notes(robot: Robot, stance: Stance) -> Iterator[str]:
+def _loop_notes(file: RobotFile, robot: Robot, stance: Stance) -> Iterator[str]:
     """Yield notes on closed loops, on joints that follow others, and on joints without a motor."""
     closed_loops = [loop for loop in robot.loops if loop.follower is None]
     followers = [loop.follower for loop in robot.loops if loop.follower is not None]
@@ -112,13 +113,27 @@ def _loop_notes(robot: Robot, stance: Stance) -> Iterator[str]:
         yield f"motors: {len(freed)} joints of legs follow others in the file, not here ({_name_joints(robot, freed)})"
     passive = [joint for joint in robot.passive if joint not in followers]
     if passive:
-        names_text = _name_joints(robot, passive)
-        yield f"passive: {len(passive)} joints without a motor keep their springs and damping ({names_text})"
+        yield _passive_note(file, robot, stance, passive)
+
+
+def _passive_note(file: RobotFile, robot: Robot, stance: Stance, passive: Sequence[int]) -> str:
+    """Return a note on joints without a motor, with the cure where most joints of the legs are among them."""
+    names_text = _name_joints(robot, passive)
+    note = f"passive: {len(passive)} joints without a motor keep their springs and damping ({names_text})"
+    joints_to_feet = {joint for leg in stance.legs for joint in robot.lineage(leg.body)}
+    if len(joints_to_feet.intersection(passive)) <= len(stance.joints):
+        return note
+    cure = "add an actuator for each joint that has a motor"
+    if file.is_urdf:
+        cure = (
+            "add a transmission for each joint that has a motor, or remove all of them; an effort of 0 means no motor"
+        )
+    return f"{note}: most joints of the legs; {cure}"
 
 
 def _name_joints(robot: Robot, joints: Sequence[int]) -> str:
     """Return the names of the first joints."""
-    return ", ".join(robot.joint_name(joint) for joint in joints[:_MAX_NAMES])
+    return checks.join_first([robot.joint_name(joint) for joint in joints])
 
 
 def _world_notes(robot: Robot) -> Iterator[str]:

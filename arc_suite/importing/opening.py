@@ -45,6 +45,8 @@ class RobotFile(NamedTuple):
         notes: one line for each thing that is left out or repaired.
         parts: all files that it depends on, with those that were looked for and are missing.
         facing: axes of the file's torso that are x and z in the model.
+        is_urdf: whether it is a URDF; else it is MJCF.
+        carriers: of each link of a URDF that is fixed to another one, the link that moves with it, by name.
     """
 
     model: mujoco.MjModel
@@ -58,6 +60,8 @@ class RobotFile(NamedTuple):
     notes: tuple[str, ...]
     parts: tuple[Path, ...]
     facing: Facing
+    is_urdf: bool
+    carriers: dict[str, str]
 
 
 class _Spec(NamedTuple):
@@ -97,6 +101,7 @@ def open_robot(path: Path, facing: Facing = LEVEL, scale: float = 1.0) -> RobotF
     is_urdf = root_element.tag == "robot"
     driven = urdf.find_driven_joints(root_element) if is_urdf else frozenset()
     speeds = urdf.find_speeds(root_element) if is_urdf else {}
+    carriers = urdf.find_carriers(root_element) if is_urdf else {}
     spec, order, notes, mesh_files, colored_shapes = _read_spec(path, root_element)
     bounds.check_mesh_files(mesh_files)
     if scale != 1.0:
@@ -114,7 +119,21 @@ def open_robot(path: Path, facing: Facing = LEVEL, scale: float = 1.0) -> RobotF
         visuals = read_visuals(path, visual_element, model, torso, facing, scale)
     all_notes = (*notes, *mesh_notes, *torso_notes, *mass_notes, *unit_notes, *inertia_notes)
     all_parts = tuple(dict.fromkeys((*parts, *mesh_files, *visuals.files)))
-    return RobotFile(model, torso, meshes, visuals, colored_shapes, order, driven, speeds, all_notes, all_parts, facing)
+    return RobotFile(
+        model=model,
+        root=torso,
+        meshes=meshes,
+        visuals=visuals,
+        colored_shapes=colored_shapes,
+        order=order,
+        driven=driven,
+        speeds=speeds,
+        notes=all_notes,
+        parts=all_parts,
+        facing=facing,
+        is_urdf=is_urdf,
+        carriers=carriers,
+    )
 
 
 def _read_spec(path: Path, root_element: ElementTree.Element) -> _Spec:

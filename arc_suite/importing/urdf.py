@@ -121,6 +121,23 @@ def find_driven_joints(robot: ElementTree.Element) -> frozenset[str]:
     return frozenset(name for name, effort in efforts.items() if _is_positive(effort))
 
 
+def find_carriers(robot: ElementTree.Element) -> dict[str, str]:
+    """Return, for each link that is fixed to another one, the link that it moves with, by name."""
+    parents = {}
+    for joint in robot.findall("joint"):
+        parent = joint.find("parent")
+        child = joint.find("child")
+        if joint.get("type") == "fixed" and parent is not None and child is not None:
+            parents[child.get("link", "")] = parent.get("link", "")
+    carriers = {}
+    for link in parents:
+        carrier = link
+        for _ in parents:  # at most so many joints lie in between, also where a broken file has a circle
+            carrier = parents.get(carrier, carrier)
+        carriers[link] = carrier
+    return carriers
+
+
 def _reduction_notes(robot: ElementTree.Element) -> Iterator[str]:
     """Yield a note on the reductions of gears."""
     texts = [element.text or "" for element in robot.iter() if element.tag in _REDUCTIONS]

@@ -170,22 +170,26 @@ def test_gains_and_limits_are_those_of_position_actuators(odd):
     assert (servo.stiffness, servo.damping, servo.limit) == (40.0, 1.5, 20.0)
     assert body.held[0].servo.limit == 5.0
     assert "limits: 20 N m of 12 motors, from forcerange" in notes
-    assert "gains: 12 of 12 servos have those of the file's position actuators, the others are sized" in notes
+    assert "gains: all servos have those of the file's position actuators" in notes
 
 
 def test_gains_that_the_file_does_not_have_are_sized():
     knee = import_robot(GO2).body.legs[0].joints[2]
     assert knee.servo.limit == 45.43
     assert 0.0 < knee.servo.stiffness <= 10.0 * knee.servo.limit
-    notes = import_robot(A1).notes
+    body, notes = import_robot(A1)
     assert "limits: 1000 N m of 12 motors is a placeholder, far above their load" in notes
+    stiffnesses = [joint.servo.stiffness for joint in body.joints]
+    (note,) = [note for note in notes if note.startswith("gains: ")]
+    span = f"{min(stiffnesses):.4g} to {max(stiffnesses):.4g} N m/rad"
+    assert note.startswith(f"gains: none in the file: sized stiffness {span}, sized damping ")
 
 
 def test_gains_that_the_file_does_not_have_can_be_chosen(odd):
     body, notes = import_robot(A1, stiffness=60.0, damping=2.0)
     assert {(joint.servo.stiffness, joint.servo.damping) for joint in body.joints} == {(60.0, 2.0)}
     (note,) = [note for note in notes if note.startswith("gains: ")]
-    assert note.endswith("the others have a stiffness of 60 N m/rad and a damping of 2 N m s/rad")
+    assert note == "gains: none in the file: chosen stiffness 60 N m/rad, chosen damping 2 N m s/rad"
     sized = import_robot(A1).body.joints[0].servo
     damped = import_robot(A1, damping=2.0).body.joints[0].servo
     assert (damped.stiffness, damped.damping) == (sized.stiffness, 2.0)
@@ -251,6 +255,21 @@ def test_feet_can_be_named_by_geom_or_body():
     assert import_robot(GO2, feet=["FL_calf", "FR_calf", "RL_calf", "RR_calf"]).body == import_robot(GO2).body
     with pytest.raises(SpecError, match=r"go2_like\.xml: unknown foot 'FL_claf'; did you mean 'FL_calf'\?"):
         import_robot(GO2, feet=["FL_claf"])
+
+
+def test_a_link_that_is_fixed_to_another_one_means_that_one(tmp_path):
+    feet = ["FR", "FL", "RR", "RL"]
+    links = [
+        f'<link name="{leg}_toe"/><joint name="{leg}_toe_fixed" type="fixed"><parent link="{leg}_calf"/>'
+        f'<child link="{leg}_toe"/></joint>'
+        for leg in feet
+    ]
+    path = tmp_path / "a1.urdf"
+    path.write_text(A1.read_text().replace("</robot>", "".join(links) + "</robot>"))
+    body = import_robot(path, feet=[f"{leg}_toe" for leg in feet]).body
+    assert body == import_robot(path, feet=[f"{leg}_calf" for leg in feet]).body
+    with pytest.raises(SpecError, match="unknown foot 'FR_tow'"):
+        import_robot(path, feet=["FR_tow"])
 
 
 def test_two_feet_of_four_do_not_stand():

@@ -164,6 +164,18 @@ def test_a_urdf_says_what_it_drives(declared, effort, tmp_path):
     assert (model.dof_damping[toe], model.dof_frictionloss[toe]) == (0.7, 0.2)
 
 
+def test_legs_that_are_mostly_passive_get_a_cure(tmp_path):
+    knees = declare(TRANSMISSION, joints=["calf"])
+    _, notes = import_robot(toes(tmp_path, knees, LIMIT.format("20")))
+    (note,) = [note for note in notes if note.startswith("passive:")]
+    assert note == (
+        "passive: 12 joints without a motor keep their springs and damping (FR_hip_joint, FR_thigh_joint, FR_toe, "
+        "FL_hip_joint, ...): most joints of the legs; add a transmission for each joint that has a motor, or remove "
+        "all of them; an effort of 0 means no motor"
+    )
+    assert "legs: 4 (r1, l1, r2, l2), 1 joint each" in notes
+
+
 def test_a_urdf_that_drives_no_legs_says_nothing_of_motors(tmp_path):
     transmission = TRANSMISSION % "FR_toe"
     body, notes = import_robot(toes(tmp_path, transmission, LIMIT.format("20")))

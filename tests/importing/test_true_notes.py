@@ -161,7 +161,7 @@ def mass_of(body):
 
 def test_links_without_a_mass_and_what_they_weigh_are_told(tmp_path):
     plain_mass = mass_of(change(tmp_path, "a1_like.urdf").body)
-    empty = "masses: {} links have none in the file and no collider: none here ({})"
+    empty = "masses: {} links have no mass and no collider in the file, and weigh nothing here ({})"
     for inertial in ("", MASS):
         parts = PART.format("lid", inertial + CUBE) + PART.format("lamp", inertial)
         body, notes = change(tmp_path, "a1_like.urdf", ("</robot>", f"{parts}</robot>"))
