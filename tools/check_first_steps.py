@@ -32,7 +32,7 @@ ROADS = {
         *(("datasets", "Datasets"), ("datasets", "Datasets of agents")),
     ),
     "animator": (
-        *(("clips", "Animation clips"), ("engines", "Clips in Blender, Godot and three.js")),
+        *(("clips", "Animation clips"), ("engines", "Clips in Blender and game engines")),
         *(("engines", "FBX, BVH and Blender"), ("play", "make web"), ("play", "Play")),
     ),
     "designer": (
