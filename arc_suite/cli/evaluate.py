@@ -5,9 +5,10 @@ mean and the standard deviation over the episodes. IQM is the interquartile mean
 bootstrap interval; fewer than ten episodes have none, as it would be too narrow. `zero` is the return of standing
 still in the first ten of the episodes. The score is 0 for standing still and 1 for the best demonstrator; that of
 another body, or of other settings, is measured in these ten, too. Where it earns less than a tenth more than standing
-still, a line says so in place of a score. With --preset medium, which is the paper's demonstrator, the table ends with
-the paper's return. A policy that learned from the episodes is refused. The JSON holds every episode, and hashes of
-policy, body, model and task.
+still, a line says so in place of a score. Where a score of at least 0.5 comes with less than half of the distance or
+the tracking, a line says whose return has the score 1. With --preset medium, which is the paper's demonstrator, the
+table ends with the paper's return. A policy that learned from the episodes is refused. The JSON holds every episode,
+and hashes of policy, body, model and task.
 
   arc-suite evaluate --robot all --policy cpg --episodes 10
   arc-suite evaluate --spec spider
@@ -51,6 +52,8 @@ def main() -> None:
         for report in reports_of_robots:
             if report.flaw:
                 print(f"{report.label}: no score: {report.flaw}")
+            if report.caution:
+                print(f"{report.label}: {report.caution}")
         if "cost_of_transport" in any_report.progress:
             footnote = transport_footnote(report.setup.body for report in reports_of_robots)
             if footnote:

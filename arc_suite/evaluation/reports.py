@@ -23,6 +23,10 @@ _WIDTHS = (18, 9, 7, 26, 9, 12)
 _HEADS = ("return +- std", "zero", "score", "IQM [95 % interval]", "steps", "paper's cpg")
 MIN_LABEL_WIDTH = 12  # of the first column
 _MIN_EPISODES = 10  # of a printed interval: that of five episodes holds the expected value in 90 % of all cases
+# Shares of the target's distance, or of the command, that a policy achieves: the first that a task has counts.
+_ACHIEVEMENTS = ("distance", "tracking")
+_LEAST_ACHIEVEMENT = 0.5  # below it, a score of at least _HIGH_SCORE has a caution
+_HIGH_SCORE = 0.5
 _bar = functools.partial(tqdm, unit="episode", leave=False)
 
 
@@ -56,6 +60,7 @@ class Report(NamedTuple):
         progress: the task's metrics by name.
         expert: return of the paper's demonstrator; None for other setups than the paper's.
         episodes: all episodes, in the order of their seeds.
+        best_preset: preset of the demonstrator whose return has the score 1; None if there is none.
     """
 
     setup: Setup
@@ -68,6 +73,25 @@ class Report(NamedTuple):
     progress: Mapping[str, Summary]
     expert: float | None
     episodes: Sequence[EpisodeResult]
+    best_preset: str | None = None
+
+    @property
+    def caution(self) -> str:
+        """Why a high score does not mean that the policy does the task; "" for another one."""
+        metric = next((name for name in _ACHIEVEMENTS if name in self.progress), None)
+        if metric is None or self.score is None or self.score < _HIGH_SCORE:
+            return ""
+        achievement = self.progress[metric].mean
+        if achievement >= _LEAST_ACHIEVEMENT:
+            return ""
+        place = (
+            f"score {self.score:.2f} with {metric} {achievement:.2f}: score 1 is the return of the best demonstrator"
+        )
+        if self.preset == self.best_preset:
+            return f"{place}, which is this one"
+        return (
+            f"{place}, {self.best_preset}, whose {metric} may be as low: see --policy cpg --preset {self.best_preset}"
+        )
 
     @property
     def of_the_paper(self) -> bool:
@@ -219,6 +243,7 @@ def report(
         progress={name: statistics.summary([episode.progress[name] for episode in episodes]) for name in metrics},
         expert=protocol.expert_return(setup),
         episodes=episodes,
+        best_preset=scale.preset,
     )
 
 

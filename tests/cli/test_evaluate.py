@@ -11,7 +11,7 @@ from returns import RETURNS
 
 from arc_suite import policies
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import anchors
+from arc_suite.evaluation import anchors, reports, statistics
 from arc_suite.robots import ROBOTS
 
 FOOTNOTE = "The cost of transport is high where motors are strong: "
@@ -82,6 +82,30 @@ def test_the_preset_is_the_one_that_suits_task_and_body(tmp_path):
         lines = evaluated(*arguments, "--episodes=1", "--set=time_limit=0.5", f"--json={path}")
         ((name, report),) = json.loads(path.read_text())["robots"].items()
         assert lines[2].startswith(f"{name}, {preset} ") and report["preset"] == preset
+
+
+@pytest.mark.parametrize(
+    ("score", "metrics", "preset", "line"),
+    [
+        (
+            0.9,
+            {"distance": 0.2, "tracking": 0.9},
+            None,
+            ", climbing, whose distance may be as low: see --policy cpg --",
+        ),
+        (0.9, {"tracking": 0.2}, "climbing", "score 0.90 with tracking 0.20: score 1 is the return of the best dem"),
+        (0.4, {"distance": 0.2}, None, None),
+        (0.9, {"distance": 0.6, "tracking": 0.1}, None, None),
+        (0.9, {"speed": 0.1}, None, None),
+        (None, {"distance": 0.2}, None, None),
+    ],
+)
+def test_a_caution_names_the_demonstrator(score, metrics, preset, line):
+    means = {name: statistics.summary([value]) for name, value in metrics.items()}
+    setup = Setup.of("queen", "rough")
+    values = {"returns": means, "zero": 0.0, "flaw": "", "length": means, "expert": None, "episodes": ()}
+    report = reports.Report(setup, preset, score=score, progress=means, best_preset="climbing", **values)
+    assert line in report.caution if line else report.caution == ""
 
 
 def test_a_demonstrator_that_earns_what_standing_still_does_gives_no_score(tmp_path):
