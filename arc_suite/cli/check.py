@@ -12,7 +12,7 @@ weak to hold it, or its joints buzz.
 With --walk its default demonstrator walks it for 100 control steps, an imported robot for 1000. Where it falls,
 drags its torso, or stays below 0.7 of the target speed, the demonstrator `medium` tries. Where that fails, too, a
 line names the fields to leave out, which are then sized to suit the body; of an imported robot, it says whether
-stronger motors help. With
+higher gains or stronger motors help. With
 --tasks the demonstrator of each task walks it, too, in four episodes of 200 control steps. A line for each
 task names the preset, the mean of its metric, and how many episodes it ended without a fall; in `recover`, in
 how many of them it got up.
@@ -157,7 +157,7 @@ def _check_walk(spec: str, body: Body) -> bool:
             print(f"{spec}: {_describe_walk(walk)} by {preset}")
             return True
         advice = _advice(body, walk) if preset == cures.PRESET else ""
-        print(f"{spec}: {body.name} {_describe_problem(walk)} by {preset}{advice}")
+        print(f"{spec}: with {preset}, {body.name} {_describe_problem(walk)}{advice}")
     return False
 
 
@@ -165,7 +165,7 @@ def _describe_problem(walk: cures.FirstWalk) -> str:
     if walk.verdict.fell:
         return f"falls after {walk.length} control steps"
     failures = " and ".join(_FAILURE_TEXTS[failure] for failure in walk.verdict.failures)
-    return f"{failures}: {_describe_walk(walk)}"
+    return f"{failures}: it {_describe_walk(walk)}"
 
 
 def _try_tasks(spec: str, body: Body) -> None:
@@ -188,20 +188,28 @@ def _advice(body: Body, walk: cures.FirstWalk) -> str:
     cure = cures.left_out(body, walk.quality)
     if cure is not None:
         cure_fields, cured_walk = cure
-        return f": leave out {' and '.join(cure_fields)} of its joints: it then {_describe_walk(cured_walk)}"
+        fields_text = " and ".join(cure_fields)
+        return f"; leave out {fields_text} of its joints: then {cures.PRESET} {_describe_walk(cured_walk)}"
     if fields:
-        return f": leaving out {', '.join(fields)} of its joints does not help"
+        return f"; leaving out {', '.join(fields)} of its joints does not help"
     return ""
 
 
 def _advice_on_motors(body: Body) -> str:
-    """Return which multiple of the motors' torques and gains makes an imported robot walk."""
+    """Return which multiple of the gains, or else of torques and gains, makes an imported robot walk."""
+    for factor in cures.FACTORS:
+        strengthened_body = cures.multiply_gains(body, factor)
+        walk = cures.walk(strengthened_body)
+        if walk.quality == _GOOD_QUALITY:
+            stiffnesses = [joint.servo.stiffness for joint in strengthened_body.joints]
+            gains = f"{factor:g} times its stiffness and damping (up to {max(stiffnesses):.3g} N m/rad)"
+            return f"; its gains are low, as with {gains} and the same torques {cures.PRESET} {_describe_walk(walk)}"
     for factor in cures.FACTORS:
         walk = cures.walk(cures.multiply_motors(body, factor))
         if walk.quality == _GOOD_QUALITY:
-            motors = f"with {factor:g} times the torques and gains of its motors ({_torque_range(body.joints, factor)})"
-            return f": its motors are weak: {motors} it {_describe_walk(walk)}"
-    return f": motors of {cures.FACTORS[-1]:g} times the torques and gains do not help"
+            motors = f"{factor:g} times the torques and gains of its motors ({_torque_range(body.joints, factor)})"
+            return f"; its motors are weak, as with {motors} {cures.PRESET} {_describe_walk(walk)}"
+    return f"; motors of {cures.FACTORS[-1]:g} times the torques and gains do not help"
 
 
 def _describe_walk(walk: cures.FirstWalk) -> str:

@@ -14,7 +14,7 @@ _STEPS = 100  # control steps; 5 s of the four robots, of which the first 2 s ar
 _STEPS_OF_IMPORTED = 1000  # control steps, as some imported robots fall late
 PRESET = "medium"  # of the demonstrator that walks: all bodies have it
 FIELDS = ("motor", "damping", "armature")  # of joints; where a spec leaves them out, they are sized
-FACTORS = (1.25, 1.5, 2.0, 3.0, 5.0)  # of the torques and gains of motors, that are tried
+FACTORS = (1.25, 1.5, 2.0, 3.0, 5.0)  # of the torques and gains of motors, or of gains alone, that are tried
 
 
 class FirstWalk(NamedTuple):
@@ -95,15 +95,23 @@ def left_out(body: Body, quality: int) -> tuple[tuple[str, ...], FirstWalk] | No
 
 def multiply_motors(body: Body, factor: float) -> Body:
     """Return an imported body whose motors have a multiple of their torques and gains."""
+    return _multiply_servos(body, factor, ("limit", "stall", "stiffness", "damping"))
 
-    def strengthen(joint: Joint) -> Joint:
-        servo = joint.servo
-        changes = {name: factor * getattr(servo, name) for name in ("limit", "stiffness", "damping")}
-        if servo.stall is not None:
-            changes["stall"] = factor * servo.stall
-        return joint.replace(servo=servo.replace(**changes))
 
-    return _change_joints(body, strengthen)
+def multiply_gains(body: Body, factor: float) -> Body:
+    """Return an imported body whose servos have a multiple of their gains, and their torques."""
+    return _multiply_servos(body, factor, ("stiffness", "damping"))
+
+
+def _multiply_servos(body: Body, factor: float, names: tuple[str, ...]) -> Body:
+    """Return an imported body whose servos have a multiple of the values that are named, except of None."""
+
+    def multiply(joint: Joint) -> Joint:
+        values = {name: getattr(joint.servo, name) for name in names}
+        changes = {name: factor * value for name, value in values.items() if value is not None}
+        return joint.replace(servo=joint.servo.replace(**changes))
+
+    return _change_joints(body, multiply)
 
 
 def _leave_out(body: Body, names: tuple[str, ...]) -> Body:

@@ -134,8 +134,8 @@ def test_a_body_that_falls_is_told_what_to_leave_out(path):
     stands, *_, falls = done.stdout.splitlines()
     assert (done.returncode, stands) == (1, f"{path}: quadruped stands and can take steps")
     found = re.fullmatch(
-        rf"{path}: quadruped falls after (\d+) control steps by medium: leave out (.*) of its joints: "
-        r"it then walks 100 control steps at [\d.]+ m/s \([\d.]+ of the target 0\.37\)",
+        rf"{path}: with medium, quadruped falls after (\d+) control steps; leave out (.*) of its joints: "
+        r"then medium walks 100 control steps at [\d.]+ m/s \([\d.]+ of the target 0\.37\)",
         falls,
     )
     assert int(found[1]) < 100 and set(found[2].split(" and ")) <= {"motor", "damping", "armature"}
@@ -157,7 +157,7 @@ def test_a_slow_body_is_told_what_to_leave_out(path):
     done = check("--walk", path)
     walks = r"walks 100 control steps at -?0\.\d\d m/s \({} of the target 0\.31\)"
     slow, fast = walks.format(r"-?0\.[0-6]\d"), walks.format(r"(0\.9|1\.[0-3])\d")
-    line = rf"{path}: spider is slow: {slow} by medium: leave out damping of its joints: it then {fast}"
+    line = rf"{path}: with medium, spider is slow: it {slow}; leave out damping of its joints: then medium {fast}"
     assert done.returncode == 1 and re.fullmatch(line, done.stdout.splitlines()[-1])
 
 
@@ -173,7 +173,7 @@ def test_a_weak_body_is_told_and_walked_all_the_same(path):
         rf"{path}: weak: reaches about 0\.\d of the target speed, as the motor of \w+ lacks .*: gear .* fits", weak
     )
     for line, preset in zip(walks, ("straight", "medium"), strict=True):
-        assert re.match(rf"{path}: spider is slow: walks 100 control steps at .*\) by {preset}", line)
+        assert re.match(rf"{path}: with {preset}, spider is slow: it walks 100 control steps at .*\)", line)
 
 
 def test_a_body_that_drags_its_torso_is_told(path):
@@ -183,7 +183,9 @@ def test_a_body_that_drags_its_torso_is_told(path):
     path.write_text(json.dumps(spec))
     done = check("--walk", path)
     assert done.returncode == 1
-    assert done.stdout.splitlines()[-1].startswith(f"{path}: spider drags its torso: walks 100 control steps at ")
+    assert done.stdout.splitlines()[-1].startswith(
+        f"{path}: with medium, spider drags its torso: it walks 100 control steps at "
+    )
 
 
 def test_another_demonstrator_walks_where_the_default_one_falls(path):
@@ -193,7 +195,7 @@ def test_another_demonstrator_walks_where_the_default_one_falls(path):
     done = check("--walk", path)
     falls, walks = done.stdout.splitlines()[1:]
     assert done.returncode == 0
-    assert re.fullmatch(rf"{path}: quadruped_15_kg_shaped falls after \d+ control steps by straight", falls)
+    assert re.fullmatch(rf"{path}: with straight, quadruped_15_kg_shaped falls after \d+ control steps", falls)
     assert re.fullmatch(rf"{path}: walks 1000 control steps at 0\.3\d m/s \(1\.\d\d of .*\) by medium", walks)
 
 
@@ -211,10 +213,21 @@ def test_weak_motors_of_an_imported_robot_are_told_with_torques_that_fit(path):
     assert done.returncode == 1
     stands, first, second = done.stdout.splitlines()
     assert stands == f"{path}: quadruped_15_kg stands and can take steps"
-    slow = r"quadruped_15_kg (is slow: walks .*\)|falls after \d+ control steps)"
-    assert re.fullmatch(rf"{path}: {slow} by straight", first)
-    cure = r"with (1\.25|1\.5|2|3) times the torques and gains of its motors \([\d.]+ to [\d.]+ N m\) it walks 1000 .*"
-    assert re.fullmatch(rf"{path}: {slow} by medium: its motors are weak: {cure}", second), second
+    slow = r"quadruped_15_kg (is slow: it walks .*\)|falls after \d+ control steps)"
+    assert re.fullmatch(rf"{path}: with straight, {slow}", first)
+    cure = (
+        r"with (1\.25|1\.5|2|3) times the torques and gains of its motors \([\d.]+ to [\d.]+ N m\) medium walks 1000 .*"
+    )
+    assert re.fullmatch(rf"{path}: with medium, {slow}; its motors are weak, as {cure}", second), second
+
+
+def test_low_gains_of_an_imported_robot_are_told_before_its_torques(path):
+    spec_files.save_body(cures.multiply_gains(imports.quadruped(), 0.1), path)
+    done = check("--walk", path)
+    assert done.returncode == 1
+    cure = r"with (1\.25|1\.5|2|3|5) times its stiffness and damping \(up to [\d.]+ N m/rad\) and the same torques"
+    line = rf"{path}: with medium, quadruped_15_kg .*; its gains are low, as {cure} medium walks 1000 control steps .*"
+    assert re.fullmatch(line, done.stdout.splitlines()[-1]), done.stdout
 
 
 def test_motors_that_do_not_hold_an_imported_robot_are_named_and_an_armature_is_not(path):
