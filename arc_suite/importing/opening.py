@@ -14,7 +14,7 @@ from arc_suite.importing import bounds, inertias, kinds, mesh_colors, missing_ma
 from arc_suite.importing.facing import LEVEL, Facing, turn_torso
 from arc_suite.importing.meshes import Mesh, file_of, meshes_of, text_length
 from arc_suite.importing.tree import FREE
-from arc_suite.importing.visual_meshes import Visuals, read_visuals
+from arc_suite.importing.visual_meshes import Visuals, describe_lost_meshes, read_visuals
 from arc_suite.robots.spec import MAX_SOURCE, SpecError
 
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
@@ -97,6 +97,7 @@ def open_robot(path: Path, facing: Facing = LEVEL, scale: float = 1.0) -> RobotF
     root_element, parts = bounds.parse(path)
     if root_element.tag not in ("mujoco", "robot"):
         raise SpecError(f"expected MJCF (mujoco) or URDF (robot), got an element {root_element.tag[:40]!r}")
+    lost_mesh_notes = tuple(describe_lost_meshes(root_element, path.parent))
     visual_element = copy.deepcopy(root_element)  # a URDF is changed as it is read
     is_urdf = root_element.tag == "robot"
     driven = urdf.find_driven_joints(root_element) if is_urdf else frozenset()
@@ -117,7 +118,7 @@ def open_robot(path: Path, facing: Facing = LEVEL, scale: float = 1.0) -> RobotF
     visuals = Visuals()
     if text_length(meshes) < _MAX_TEXT_WITH_VISUALS:
         visuals = read_visuals(path, visual_element, model, torso, facing, scale)
-    all_notes = (*notes, *mesh_notes, *torso_notes, *mass_notes, *unit_notes, *inertia_notes)
+    all_notes = (*notes, *mesh_notes, *torso_notes, *mass_notes, *unit_notes, *inertia_notes, *lost_mesh_notes)
     all_parts = tuple(dict.fromkeys((*parts, *mesh_files, *visuals.files)))
     return RobotFile(
         model=model,

@@ -230,6 +230,23 @@ def _repair_shapes(links: Elements, folder: Path, mesh_files: list[Path]) -> Ite
         yield f"left out: {len(links_with_losses)} colliders that cannot be read, such as of {links_with_losses[0]}"
 
 
+def find_lost_meshes(robot: ElementTree.Element, folder: Path) -> tuple[list[str], list[str]]:
+    """Return the visual meshes of a URDF that cannot be shown: those of other formats, and those that are missing.
+
+    Args:
+        robot: the root element, as in the file.
+        folder: folder of the file.
+    """
+    names = dict.fromkeys(mesh.get("filename", "") for mesh in robot.iterfind("link/visual/geometry/mesh"))
+    other_formats = [name for name in names if not name.lower().endswith(_MESH_EXTENSIONS)]
+    missing = []
+    for name in names:
+        files = _mesh_file_candidates(name, folder)
+        if name not in other_formats and not any(file.is_file() for file in files):
+            missing.append(name)
+    return other_formats, missing
+
+
 def _is_positive(text: str | None) -> bool:
     return text is not None and _is_number(text) and float(text) > 0.0
 

@@ -2,14 +2,14 @@
 
 import contextlib
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from arc_suite import rotations
+from arc_suite import checks, rotations
 from arc_suite.importing import bounds, mesh_colors, units, urdf
 from arc_suite.importing.facing import Facing
 from arc_suite.importing.meshes import file_of
@@ -203,6 +203,21 @@ def _cluster(coordinates: np.ndarray) -> np.ndarray:
     width = 2 * _FINEST_GRID
     _, clusters = np.unique((x * width + y) * width + z, return_inverse=True)
     return clusters
+
+
+def describe_lost_meshes(root_element: ElementTree.Element, folder: Path) -> Iterator[str]:
+    """Yield a line on visual meshes of a URDF that are of other formats, and one on missing ones; none for MJCF."""
+    other_formats, missing = urdf.find_lost_meshes(root_element, folder)
+    if other_formats:
+        text = f"looks: {len(other_formats)} visual meshes are of a format that is not read"
+        yield f"{text} ({_shorten_names(other_formats)}): save them as STL or OBJ"
+    if missing:
+        yield f"looks: {len(missing)} files of visual meshes are missing ({_shorten_names(missing)})"
+
+
+def _shorten_names(names: Sequence[str]) -> str:
+    """Return the first names of files, without their folders."""
+    return checks.join_first([checks.quote(name.rpartition("/")[2]) for name in names])
 
 
 def describe_visuals(visuals: Visuals, colored_shapes: int) -> str:

@@ -146,6 +146,16 @@ def test_a_mesh_that_cannot_be_read_keeps_no_robot_out(data, tmp_path):
     assert COLLIDERS in import_robot(path).notes
 
 
+def test_meshes_of_other_formats_and_missing_ones_are_named(tmp_path):
+    line = "looks: {} visual meshes are of a format that is not read ({}.dae): save them as STL or OBJ"
+    assert line.format(4, "trunk.dae, hip.dae, thigh.dae, calf") in import_robot(A1).notes
+    path = write_urdf(tmp_path)
+    notes = import_robot(path).notes
+    assert line.format(3, "hip.dae, thigh.dae, calf") in notes and not [note for note in notes if "missing" in note]
+    (tmp_path / "trunk.stl").unlink()
+    assert "looks: 1 files of visual meshes are missing (trunk.stl)" in import_robot(path).notes
+
+
 def test_the_file_of_a_mesh_is_followed(tmp_path):
     path = write_urdf(tmp_path)
     body = registry.body_of(path)
