@@ -52,9 +52,24 @@ flags.DEFINE_enum(
     "Pairs, left and right, or legs all around; with --legs or --seed. [default: pairs for an even number, or random]",
 )
 flags.DEFINE_float("scale", None, "Multiply all lengths by this and size the body anew.", *generator.SCALE_RANGE)
-for part, forms in torsos.PARTS.items():
-    part_help = f"Form of the {part}, of a body with a plain torso."
-    flags.DEFINE_enum(part, torsos.UNCHANGED, [torsos.UNCHANGED, *forms], part_help)
+flags.DEFINE_enum(
+    "torso",
+    torsos.UNCHANGED,
+    [torsos.UNCHANGED, *torsos.PARTS["torso"]],
+    "Form of the torso, of a body with a plain torso.",
+)
+flags.DEFINE_enum(
+    "head",
+    torsos.UNCHANGED,
+    [torsos.UNCHANGED, *torsos.PARTS["head"]],
+    "Form of the head, of a body with a plain torso.",
+)
+flags.DEFINE_enum(
+    "tail",
+    torsos.UNCHANGED,
+    [torsos.UNCHANGED, *torsos.PARTS["tail"]],
+    "Form of the tail, of a body with a plain torso.",
+)
 flags.DEFINE_string("name", None, "Name of the body, of letters a to z, digits and underscores.")
 flags.DEFINE_bool("json", False, "Write the spec instead of the model.")
 flags.DEFINE_bool("visuals", False, "Add decorations without mass or contacts.")
