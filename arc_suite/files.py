@@ -281,7 +281,7 @@ def suggest_similar_file(text: str, extensions: Iterable[str]) -> str:
         entry.removesuffix(extension): extension
         for extension in extensions
         for entry in _list_folder(path.parent)
-        if entry.endswith(extension)
+        if entry.endswith(extension) and (path.parent / entry).is_file()
     }
     matches = difflib.get_close_matches(path.name, extension_of_stem, n=1, cutoff=_LEAST_SIMILARITY)
     return f"; did you mean {path.parent / (matches[0] + extension_of_stem[matches[0]])}?" if matches else ""

@@ -87,8 +87,8 @@ def refuse_value(error: flags.IllegalFlagValueError) -> None:
     name, _, value = flag_and_value.removeprefix("flag --").partition("=")
     parser = flags.FLAGS[name].parser
     choices = getattr(parser, "enum_values", ("true", "false"))
-    *others, last = choices
-    expected = parser.syntactic_help or f"{', '.join(others)} or {last}"
+    *first_choices, last_choice = choices
+    expected = parser.syntactic_help or f"{', '.join(first_choices)} or {last_choice}"
     hint = ""
     host, colon, port = value.rpartition(":")
     if name == "port" and colon and port.isdecimal():
