@@ -279,14 +279,14 @@ def _refuse_other_words(text: str) -> None:
     if text in TASKS:
         raise ValueError(f"robot {text!r}: it is a task; robots are {', '.join(ROBOTS)}")
     _refuse_name_of_file("robot", text, (".json", *READERS))
-    is_similar_to_word = bool(checks.hint(text, robot_words()))
-    file_cure = "" if is_similar_to_word else files.suggest_similar_file(text, (".json", *READERS))
-    if file_cure:
-        raise ValueError(f"unknown robot {checks.preview(text)}{file_cure}")
     if files.is_folder(text):
         extensions = ", ".join((".json", *READERS))
         hint = hint_in_folder(text)
         raise ValueError(f"robot {checks.preview(text)}: it is a folder; expected a name, or a file {extensions}{hint}")
+    is_similar_to_word = bool(checks.hint(text, robot_words()))
+    file_cure = "" if is_similar_to_word else files.suggest_similar_file(text, (".json", *READERS))
+    if file_cure:
+        raise ValueError(f"unknown robot {checks.preview(text)}{file_cure}")
 
 
 def _refuse_gymnasium_id(kind: str, text: str) -> None:
