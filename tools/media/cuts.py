@@ -39,6 +39,7 @@ CUTS: Mapping[str, View | Hand] = {
         drives=False,
         settings={"difficulty": 1.0},
         seconds=1.75,
+        fade=0,
         look=_LOW_SUN,
         shows_markers=False,
     ),
@@ -50,6 +51,7 @@ CUTS: Mapping[str, View | Hand] = {
         aim=-0.35,
         drives=False,
         seconds=1.5,
+        fade=0,
         look=_DAY,
     ),
     "kick": View(
@@ -63,6 +65,7 @@ CUTS: Mapping[str, View | Hand] = {
         aim=-0.3,
         drives=False,
         seconds=2.0,
+        fade=0,
         look=_DAY,
     ),
     "hand": Hand("queen", before=1.5, path=_LIFT, seconds=1.75),

@@ -15,6 +15,7 @@ from media.views import Instant, Look, View
 _CAMERA = "profile"
 _SUN_DISTANCE = 6.0  # of the sun from the torso, standing heights
 _MAX_DRIFT = 0.05  # to a side, as a share of the way, along which tiles of the ground still meet
+_FRAMING_INTERVAL = 8  # frames from one whose framing is checked to the next
 MIN_SHARE = 1.0 / 3.0  # of the width of a picture, that a creature has
 
 
@@ -54,7 +55,7 @@ def pictures_of(view: View, size: tuple[int, int], is_film: bool) -> Iterator[np
     """Yield the pictures (height, width, 3) of a view: of all frames of its film, or of its moment alone.
 
     Raises:
-        ValueError: the creature is narrower than `MIN_SHARE` of a picture.
+        ValueError: the creature is narrower than `MIN_SHARE` of a picture, or an edge cuts it.
     """
     environment = views.open_environment(view)
     film = views.film_instants(view, environment)
@@ -63,16 +64,28 @@ def pictures_of(view: View, size: tuple[int, int], is_film: bool) -> Iterator[np
     environment.close()
     body = environment.task.body
     camera = Camera(view, body, np.array([instant.qpos[:7] for instant in film]))
-    stage = Stage(body, environment.physics.arena, view.look, camera, len(film))
+    stage = Stage(body, environment.physics.arena, view.look, camera, view.frames)
     try:
-        stage.check_share(film, size)
+        stage.check_framing(film, size)
         if still is not None:
             yield stage.draw(still, still_frame, size, pictures.QUALITIES["still"].scale)
             return
-        for frame, instant in enumerate(film):
-            yield stage.draw(instant, frame, size, pictures.QUALITIES["film"].scale)
+        film_pictures = [
+            stage.draw(instant, frame, size, pictures.QUALITIES["film"].scale) for frame, instant in enumerate(film)
+        ]
+        yield from close(film_pictures, view.fade)
     finally:
         stage.close()
+
+
+def close(film: Sequence[np.ndarray], fade: int) -> list[np.ndarray]:
+    """Return a film (height, width, 3) without its first pictures, into which its last ones fade."""
+    closed = list(film[fade:])
+    for number, before in enumerate(film[:fade]):
+        share = (number + 1) / (fade + 1)
+        place = len(closed) - fade + number
+        closed[place] = np.rint((1.0 - share) * closed[place] + share * before).astype(np.uint8)
+    return closed
 
 
 class Stage:
@@ -97,18 +110,22 @@ class Stage:
         width, height = size
         return pictures.shrink(self._render(instant, frame, scale * width, scale * height), scale)
 
-    def check_share(self, film: Sequence[Instant], size: tuple[int, int]) -> None:
-        """Raise ValueError where the creature is narrower than `MIN_SHARE` at the ends or in the middle of a film."""
+    def check_framing(self, film: Sequence[Instant], size: tuple[int, int]) -> None:
+        """Raise ValueError where the creature is narrower than `MIN_SHARE`, or reaches an edge of the picture."""
         width, height = size
         model = self._drawing.model.ptr
         is_creature = (model.geom_bodyid > 0) & (model.body_mocapid[model.geom_bodyid] < 0)  # mocap: obstacles
-        for frame in (0, len(film) // 2, len(film) - 1):
+        for frame in {*range(0, len(film), _FRAMING_INTERVAL), len(film) - 1}:
             geoms = self._render(film[frame], frame, width, height, segmentation=True)[..., 0]
             shows_body = (geoms >= 0) & is_creature[geoms]
             columns = np.flatnonzero(shows_body.any(axis=0))
             share = (np.ptp(columns) + 1) / width if len(columns) else 0.0
             if share < MIN_SHARE:
                 raise ValueError(f"frame {frame}: the creature has {share:.2f} of the width, at least {MIN_SHARE:.2f}")
+            edges = (shows_body[:, 0], shows_body[:, -1], shows_body[0], shows_body[-1])
+            for name, edge in zip(("left", "right", "top", "bottom"), edges, strict=True):
+                if edge.any():
+                    raise ValueError(f"frame {frame}: the {name} edge cuts the creature")
 
     def _render(self, instant: Instant, frame: int, width: int, height: int, **kwargs) -> np.ndarray:
         def render():
@@ -146,7 +163,11 @@ def _set_light(model, look: Look, height: float) -> None:
 
 
 def _fit_tiles(model, way: float) -> None:
-    """Make tiles of a level ground as long as the way, m, or a whole part of it: they lie as before at its end."""
+    """Make a pair of tiles of a level ground as long as the way, m, or a whole part of it: they lie as before at its end.
+
+    A plane spans two units of its texture's coordinates, so that a pair of tiles is 2 / repeats long.
+    """
     material = model.material("ground").id
     repeats = model.mat_texrepeat[material, 0]
-    model.mat_texrepeat[material] = max(1, round(way * repeats)) / way
+    pairs = max(1, round(0.5 * way * repeats))
+    model.mat_texrepeat[material] = 2.0 * pairs / way

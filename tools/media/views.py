@@ -55,6 +55,8 @@ class View(NamedTuple):
         settings: settings of the task.
         policy: name of the policy.
         seconds: duration of the film: whole cycles of the gait.
+        fade: number of last pictures that fade into those before the first one, so that the film closes; 0 where it
+            closes without.
         look: ground and light.
         shows_markers: whether arrows of commands and kicks are drawn.
     """
@@ -73,6 +75,7 @@ class View(NamedTuple):
     settings: Mapping[str, float] = {}
     policy: str = "cpg"
     seconds: float = 3.0 / 1.5
+    fade: int = 8
     look: Look = Look()
     shows_markers: bool = True
 
@@ -116,12 +119,13 @@ def play(view: View, environment, steps: int) -> Iterator[int]:
 
 
 def film_instants(view: View, environment) -> list[Instant]:
-    """Return what is drawn of the frames of a film, between control steps by Hermite's cubic.
+    """Return what is drawn of a film's frames, and of those before that it fades into.
 
-    Markers and dark legs are those of the step before.
+    Frames lie between control steps, by Hermite's cubic. Markers and dark legs are those of the step before.
     """
     steps_in_frame = 1.0 / (FPS * environment.control_timestep())
-    count = math.ceil(view.frames * steps_in_frame) + 1
+    num_frames = view.fade + view.frames
+    count = math.ceil(num_frames * steps_in_frame) + 1
     data = environment.physics.data
     instants = []
     states = []
@@ -130,7 +134,7 @@ def film_instants(view: View, environment) -> list[Instant]:
         states.append((data.qpos.copy(), data.qvel.copy()))
     model = environment.physics.model.ptr
     film = []
-    for frame in range(view.frames):
+    for frame in range(num_frames):
         step, share = divmod(frame * steps_in_frame, 1.0)
         before = states[int(step)]
         after = states[int(step) + 1]
@@ -153,12 +157,12 @@ def _read_instant(view: View, environment) -> Instant:
     return Instant(data.qpos.copy(), data.mocap_pos.copy(), markers, tuple(task.failed_legs()))
 
 
-_CLOSE = {"distance": 3.7, "azimuth": -42.0}
+_CLOSE = {"distance": 3.7, "azimuth": -42.0, "fade": 0}
 _SIDE = {"azimuth": -90.0, "elevation": 14.0, "distance": 4.5}
 ROBOT_VIEWS = {robot: View(robot, **_CLOSE) for robot in ("queen", "bastion", "tick", "leaper")}
 ROBOT_VIEWS["leaper"] = ROBOT_VIEWS["leaper"]._replace(seconds=3.0 / 1.2, aim=-0.2, distance=4.5)
 TASK_VIEWS = {
-    "walk": View("queen", azimuth=-60.0, distance=4.0, aim=-0.25),
+    "walk": View("queen", azimuth=-60.0, distance=4.0, aim=-0.25, fade=0),
     "steer": View("bastion", "steer", 39, 105, 60, azimuth=-25.0, elevation=32.0, distance=4.6, seconds=5.0 / 1.5),
     "directed": View("queen", "directed", 4, 65, 50, (0.7, 0.0, 0.4), azimuth=-60.0, elevation=14.0, seconds=4.0 / 1.5),
     "shoved": View("bastion", "shoved", 1, 45, 30, (1.0, 0.0, 0.0), azimuth=35.0, elevation=18.0, seconds=4.0 / 1.5),
@@ -176,11 +180,11 @@ TASK_VIEWS = {
     "gaps": View("tick", "gaps", **{**_SIDE, "elevation": 25.0}),
     "course": View("queen", "course", start=110, **_SIDE),
     "leap": View(
-        "queen", "leap", start=288, moment=32, seconds=4.0 / 1.5, **{**_SIDE, "elevation": 20.0, "distance": 5.5}
+        "queen", "leap", start=288, moment=32, seconds=4.0 / 1.5, **{**_SIDE, "elevation": 20.0, "distance": 5.3}
     ),
     "roam": View("queen", "roam", 0, 40, 31, elevation=20.0, distance=4.6),
     "navigate": View("bastion", "navigate", 0, 40, 62, azimuth=155.0, elevation=38.0, distance=6.6, seconds=5.0 / 1.5),
-    "mimic": View("tick", "mimic", azimuth=-20.0, elevation=18.0, distance=5.8),
+    "mimic": View("tick", "mimic", azimuth=-20.0, elevation=18.0, distance=5.8, fade=0),
     "recover": View(
         "tick",
         "recover",
@@ -188,7 +192,7 @@ TASK_VIEWS = {
         0,
         12,
         elevation=18.0,
-        distance=5.0,
+        distance=6.6,
         drives=False,
         policy="ppo",
         seconds=5.0 / 1.5,
@@ -196,3 +200,5 @@ TASK_VIEWS = {
 }
 ONE_VIEWS = {name: view for name, view in {**ROBOT_VIEWS, **TASK_VIEWS}.items() if name != "recover"}
 FALL_VIEWS = {f"fall {seed}": TASK_VIEWS["recover"]._replace(seed=seed) for seed in range(12)}
+FALL_VIEWS["fall 8"] = FALL_VIEWS["fall 8"]._replace(distance=7.8, aim=-0.8)  # it gets up away from where it lay
+FALL_VIEWS["fall 10"] = FALL_VIEWS["fall 10"]._replace(distance=6.0, aim=0.0)  # it lies on its back, feet up
