@@ -163,7 +163,7 @@ def _set_light(model, look: Look, height: float) -> None:
 
 
 def _fit_tiles(model, way: float) -> None:
-    """Make a pair of tiles of a level ground as long as the way, m, or a whole part of it: they lie as before at its end.
+    """Make pairs of tiles of a level ground fit into the way, m, so that they lie as before at its end.
 
     A plane spans two units of its texture's coordinates, so that a pair of tiles is 2 / repeats long.
     """
