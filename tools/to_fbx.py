@@ -3,7 +3,7 @@
 Needs Blender's `bpy` in an environment of its own, for Python 3.11:
   tools/ensure_venv.sh .venv-blender && .venv-blender/bin/python -m pip install bpy==5.0.1
   .venv-blender/bin/python tools/to_fbx.py queen.glb queen.fbx
-Blender 5 itself runs the program, too:
+Blender 5 itself may run the program, too, which nobody has tried:
   blender --background --python tools/to_fbx.py -- queen.glb queen.fbx
 
 The extension of the second file says what is written:
