@@ -63,6 +63,8 @@ TESTS = {
     "Learning has those from 100,000 on, and judging those from 4,100,000,000 on.": [
         f"{HERE}::test_seeds_and_their_ranges"
     ],
+    "The seed of a run, such as 0, is no seed of an episode: the run learns from episodes of its own, from 100,000 "
+    "on.": [f"{HERE}::test_seeds_and_their_ranges"],
     "Evaluation refuses a policy whose file says that it learned from these episodes.": [
         "evaluation/test_memory.py::test_episodes_that_a_policy_learned_from_do_not_judge_it"
     ],
@@ -139,7 +141,10 @@ TESTS = {
     ],
 }
 # Sentences that promise nothing.
-SIGNPOSTS = ("[Limits](datasets.md#datasets-of-others) are those of other libraries.",)
+SIGNPOSTS = (
+    "[Limits](datasets.md#datasets-of-others) are those of other libraries.",
+    "A command with `--minutes` is an exception, as CPU time differs from run to run.",
+)
 
 
 def sentences(page):
