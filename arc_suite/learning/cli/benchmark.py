@@ -28,7 +28,7 @@ _PLACE_NAMES = [f"{robot}-{task}" for robot, task in PLACES]
 
 FLAGS = flags.FLAGS
 flags.DEFINE_string("algorithm", "ppo", "As in arc-suite train.")
-flags.DEFINE_integer("seeds", SEEDS, "Seeds of each place.", 1, SEEDS)
+flags.DEFINE_integer("seeds", SEEDS, "Number of seeds of each place: 2 are seeds 0 and 1.", 1, SEEDS)
 flags.DEFINE_list("places", _PLACE_NAMES, "Places to run, ROBOT-TASK. [default: all ten]")
 flags.DEFINE_integer("jobs", None, "Runs at a time. [default: as many as cores]", lower_bound=1)
 flags.DEFINE_string("policies", None, "Folder of policies to score in place of runs.")
