@@ -56,7 +56,7 @@ GOALS = {
 }
 
 MAX_SECONDS = 5400  # of a command, which hangs after that
-ELSEWHERE = ("pip install", "python learn.py", "python play.py")  # the last two are of docs/clients.md
+ELSEWHERE = ("pip install", "python learn.py", "python play.py", "blender ")  # the two scripts are of docs/clients.md
 
 # What a folder has at the start: parts of the clone, which pages name, and a robot in place of the reader's: its file
 # and the module of its own computer. Blender's environment is that of `make check-blender`, where there is one.
