@@ -186,7 +186,8 @@ def test_train_names_modules_for_a_configuration(folder):
     done = programs.arc_suite("train", "--config=run.json", "--modules=strolling", cwd=folder)
     programs.refused(done, "arc-suite train: run.json: steps: expected an integer from 1, got 0\n")
     done = programs.arc_suite("train", "--modules=stroling", cwd=folder)
-    programs.refused(done, "arc-suite train: --modules: cannot import stroling: No module named 'stroling'; start in ")
+    line = "arc-suite train: --modules: cannot import stroling: No module named 'stroling'; did you mean 'strolling'?\n"
+    programs.refused(done, line)
 
 
 BEETLE = {"robot": "strolling:beetle", "task": "strolling:stroll"}

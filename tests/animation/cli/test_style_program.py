@@ -173,7 +173,7 @@ def test_all_robots(tmp_path):
         ),
         ([f"--seed={2**32 - 1}"], "seed: expected an integer from 0 to 4294967295, got 4294967296"),
         (["--json=nowhere/a.json"], "cannot write nowhere/a.json: no such file or directory"),
-        ([f"--output={SPIDER}"], f"cannot make folder {SPIDER}: file exists"),
+        ([f"--output={SPIDER}"], f"--output={SPIDER}: expected a folder, got the name of a file"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_status_1(tmp_path, arguments, message):
