@@ -21,39 +21,49 @@ SUBSTEP = 0.0002  # s; torques are computed outside of the integrator, which nee
 DROP = 0.02  # m, from which the robot comes down
 
 
-class Robot:
-    """A robot on a level floor, whose sensors and motors have the order of policy.json."""
+def read_spec(path: str) -> mujoco.MjSpec:
+    """Return the robot of a file, free on a level floor; its parts do not touch one another, as in training."""
+    spec = mujoco.MjSpec.from_file(path)
+    base = spec.worldbody.first_body()
+    if not base.joints:
+        base.add_freejoint()
+    for geom in [*spec.geoms]:
+        geom.conaffinity = 0
+    floor = spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0.0, 0.0, 1.0))
+    floor.contype = 0
+    floor.conaffinity = 1
+    return spec
 
-    def __init__(self, path: str, facts: dict):
-        """Read the file; its actuators become those of policy.json."""
-        spec = mujoco.MjSpec.from_file(path)
-        base = spec.worldbody.first_body()
-        if not base.joints:
-            base.add_freejoint()
+
+class Robot:
+    """A robot whose sensors and motors have the order of policy.json."""
+
+    def __init__(self, spec: mujoco.MjSpec, facts: dict, substep: float = SUBSTEP):
+        """Compile the robot with the motors of policy.json for actuators, and time steps of a substep, s, at most."""
+        self.facts = facts
         for actuator in list(spec.actuators):
             spec.delete(actuator)
         for motor in facts["motors"]:
-            actuator = spec.add_actuator(name=motor["motor"], target=motor["motor"], trntype=mujoco.mjtTrn.mjTRN_JOINT)
-            actuator.set_to_motor()
-        for geom in [*spec.geoms]:
-            geom.conaffinity = 0  # parts of the robot do not touch one another, as in training
-        floor = spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0.0, 0.0, 1.0))
-        floor.contype = 0
-        floor.conaffinity = 1
-        self.substeps = math.ceil(facts["control_timestep"] / SUBSTEP - 1e-6)
+            self.add_motor(spec, motor)
+        self.substeps = math.ceil(facts["control_timestep"] / substep - 1e-6)
         spec.option.timestep = facts["control_timestep"] / self.substeps
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         joints = [self.model.joint(motor["motor"]) for motor in facts["motors"]]
-        self._angles = [joint.qposadr[0] for joint in joints]
-        self._speeds = [joint.dofadr[0] for joint in joints]
-        for motor, address in zip(facts["motors"], self._angles, strict=True):
-            self.data.qpos[address] = motor["home"]
-        self._put_on_floor()
+        self.angles = [joint.qposadr[0] for joint in joints]
+        self.speeds = [joint.dofadr[0] for joint in joints]
 
-    def _put_on_floor(self) -> None:
-        """Put the lowest geom of the robot a little above the floor."""
+    def add_motor(self, spec: mujoco.MjSpec, motor: dict):
+        """Add a motor whose control is its torque, N m, and return it."""
+        actuator = spec.add_actuator(name=motor["motor"], target=motor["motor"], trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        actuator.set_to_motor()
+        return actuator
+
+    def stand(self) -> None:
+        """Take the standing pose, with the lowest geom a little above the floor."""
+        for motor, address in zip(self.facts["motors"], self.angles, strict=True):
+            self.data.qpos[address] = motor["home"]
         mujoco.mj_forward(self.model, self.data)
         lowest = math.inf
         for geom in range(self.model.ngeom):
@@ -69,13 +79,13 @@ class Robot:
         """Return what the sensors show."""
         qpos = self.data.qpos
         qvel = self.data.qvel
-        return program.Sensors(qpos[self._angles], qvel[self._speeds], qpos[3:7].copy(), qvel[3:6].copy())
+        return program.Sensors(qpos[self.angles], qvel[self.speeds], qpos[3:7].copy(), qvel[3:6].copy())
 
     def write(self, output) -> None:
         """Move on by a control step: motors do what the output says."""
         for _ in range(self.substeps):
-            errors = output.targets - self.data.qpos[self._angles]
-            torques = output.stiffness * errors - output.damping * self.data.qvel[self._speeds] + output.torques
+            errors = output.targets - self.data.qpos[self.angles]
+            torques = output.stiffness * errors - output.damping * self.data.qvel[self.speeds] + output.torques
             self.data.ctrl[:] = np.clip(torques, -output.limits, output.limits)
             mujoco.mj_step(self.model, self.data)
 
@@ -87,7 +97,8 @@ def main(path: str, folder: str, *numbers: str) -> None:
 
     policy = run.Policy.load(folder)
     command = np.array(numbers or ("0.3", "0", "0"), dtype=float)
-    robot = Robot(path, policy.facts)
+    robot = Robot(read_spec(path), policy.facts)
+    robot.stand()
     period = policy.facts["control_timestep"]
     for step in range(round(SECONDS / period)):
         sensors = robot.read(run)

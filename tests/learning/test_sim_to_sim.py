@@ -3,6 +3,7 @@
 import importlib.util
 import math
 import re
+import runpy
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -30,6 +31,8 @@ from arc_suite.tasks.modified_task import sensed_mask
 pytest.importorskip("onnx", reason="of the extra learn: make check-agents")
 pytest.importorskip("onnxruntime", reason="runs policies in a test: make check-agents")
 
+PROGRAM = Path(__file__).parents[2] / "examples" / "robot_in_mujoco.py"
+EXAMPLE = runpy.run_path(str(PROGRAM))
 SENSED = {"sensors_only": True, "exclude_blocks": "contact_forces"}
 SUBSTEP = 0.002  # s, of the files
 EPISODES = 20
@@ -70,34 +73,20 @@ def write_tick(folder):
     return path, mujoco.MjSpec.from_file(str(folder / "beetle.xml"))
 
 
-class Robot:
-    """A robot in plain MuJoCo: sensors and motors in the order of policy.json."""
+class Robot(EXAMPLE["Robot"]):
+    """A robot whose motors are MuJoCo's: those of servos are position actuators, which the integrator sees."""
 
     def __init__(self, spec, facts):
-        for actuator in list(spec.actuators):
-            spec.delete(actuator)
-        for motor in facts["motors"]:
-            actuator = spec.add_actuator(name=motor["motor"], target=motor["motor"], trntype=mujoco.mjtTrn.mjTRN_JOINT)
-            actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
-            actuator.forcerange = (-motor["limit"], motor["limit"])
-            actuator.gainprm[0] = 1.0
-            if facts["torque_held"] == "substep":
-                actuator.biastype = mujoco.mjtBias.mjBIAS_AFFINE
-                actuator.gainprm[0] = motor["stiffness"]
-                actuator.biasprm[:3] = (0.0, -motor["stiffness"], -motor["damping"])
-        self.substeps = math.ceil(facts["control_timestep"] / SUBSTEP - 1e-6)
-        spec.option.timestep = facts["control_timestep"] / self.substeps
-        spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-        self.model = spec.compile()
-        self.data = mujoco.MjData(self.model)
-        joints = [self.model.joint(motor["motor"]) for motor in facts["motors"]]
-        self.angles = [joint.qposadr[0] for joint in joints]
-        self.speeds = [joint.dofadr[0] for joint in joints]
+        super().__init__(spec, facts, SUBSTEP)
 
-    def read(self, program):
-        data = self.data
-        quaternion, rates = data.qpos[3:7].copy(), data.qvel[3:6].copy()
-        return program.Sensors(data.qpos[self.angles], data.qvel[self.speeds], quaternion, rates)
+    def add_motor(self, spec, motor):
+        actuator = super().add_motor(spec, motor)
+        actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
+        actuator.forcerange = (-motor["limit"], motor["limit"])
+        if self.facts["torque_held"] == "substep":
+            actuator.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+            actuator.gainprm[0] = motor["stiffness"]
+            actuator.biasprm[:3] = (0.0, -motor["stiffness"], -motor["damping"])
 
     def write(self, output):
         self.data.ctrl[:] = output.targets if output.stiffness.any() else output.torques
@@ -243,8 +232,7 @@ def test_returns_are_the_suites(write, tmp_path):
 
 def play_example(path, folder, *numbers):
     """Run examples/robot_in_mujoco.py, and return its last line."""
-    program = Path(__file__).parents[2] / "examples" / "robot_in_mujoco.py"
-    command = [sys.executable, str(program), str(path), str(folder), *numbers]
+    command = [sys.executable, str(PROGRAM), str(path), str(folder), *numbers]
     return programs.passed(subprocess.run(command, capture_output=True, text=True)).splitlines()[-1]
 
 
