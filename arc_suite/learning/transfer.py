@@ -42,8 +42,9 @@ def _mutant(index: int) -> Body:
     return body.replace(torso=body.torso.replace(standing_height=None))
 
 
-# Bodies that test a policy by family: a function of an index from 0 on, and the number of bodies.
-FAMILIES: dict[str, tuple[Callable[[int], Body], int]] = {
+Family = tuple[Callable[[int], Body], int]  # a function of an index from 0 on, and the number of bodies
+# Bodies that test a policy.
+FAMILIES: dict[str, Family] = {
     "random": (lambda index: sound_body(FIRST_TEST_SEED + index), 50),
     "varied": (lambda index: varied_body(FIRST_TEST_SEED + index), 50),
     "robots": (_resized_robot, 4),
@@ -157,25 +158,25 @@ def compare(network: Network, bodies: Iterable[Body], task: str, settings: Mappi
     return [Comparison(*body_episodes) for body_episodes in episodes]
 
 
-def compare_family(name: str, network: Network, task: str, settings: Mapping | None = None) -> list[Comparison]:
-    """Play the episodes of a family of `FAMILIES`, or of bodies as of `registry.bodies_of`; see `compare`."""
-    bodies = _bodies_of_family(name)
-    return compare(network, tqdm(bodies, desc=name, unit="body", leave=False, disable=None), task, settings)
+def compare_family(
+    name: str, family: Family, network: Network, task: str, settings: Mapping | None = None
+) -> list[Comparison]:
+    """Play the episodes of a family; see `compare`."""
+    make_body, count = family
+    bodies = map(make_body, tqdm(range(count), desc=name, unit="body", leave=False, disable=None))
+    return compare(network, bodies, task, settings)
 
 
-def check_family(name: str) -> None:
-    """Raise an error for a word that is neither a family of `FAMILIES` nor a file or `module:name` of a body."""
+def find_family(name: str) -> Family:
+    """Return the family of `FAMILIES`, or that of the bodies of a file or `module:name`.
+
+    Raises:
+        ValueError: an unknown name, or as `registry.bodies_of`.
+    """
     if registry.is_file_or_module(name):
-        registry.bodies_of(name)
-    else:
-        checks.name(name, FAMILIES, "family")
-
-
-def _bodies_of_family(name: str) -> list[Body]:
-    if name not in FAMILIES:
-        return list(registry.bodies_of(name))
-    make_body, count = FAMILIES[name]
-    return [make_body(index) for index in range(count)]
+        bodies = registry.bodies_of(name)
+        return bodies.__getitem__, len(bodies)
+    return FAMILIES[checks.name(name, FAMILIES, "family")]
 
 
 def result(comparisons: list[Comparison]) -> TransferResult:

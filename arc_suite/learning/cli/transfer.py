@@ -42,8 +42,7 @@ def main() -> None:
     task, settings = complete_task(trained, task, settings)
     if FLAGS.families == ["all"]:
         raise ValueError("--families=all: without the flag, all families play")
-    for family in FLAGS.families:
-        transfer.check_family(family)
+    families = {name: transfer.find_family(name) for name in FLAGS.families}
     if FLAGS.output:
         checks.extension(FLAGS.output, [".csv"])
         files.check_target(FLAGS.output)
@@ -55,10 +54,10 @@ def main() -> None:
     universal.Universal(network, definition)  # raises an error now for a task in which it cannot act
     print(f"{'family':<10}" + "".join(f"{head:>13}" for head in transfer.TransferResult._fields))
     comparisons_by_family = {}
-    for family in FLAGS.families:
-        comparisons = transfer.compare_family(family, network, task, settings)
+    for name, family in families.items():
+        comparisons = transfer.compare_family(name, family, network, task, settings)
         numbers = transfer.result(comparisons)
-        print(f"{family:<10}" + "".join(f"{number:>13.4g}" for number in numbers), flush=True)
-        comparisons_by_family[family] = comparisons
+        print(f"{name:<10}" + "".join(f"{number:>13.4g}" for number in numbers), flush=True)
+        comparisons_by_family[name] = comparisons
     if FLAGS.output:
         bodies.write(Path(FLAGS.output), FLAGS.name or Path(FLAGS.policy).stem, task, comparisons_by_family)
