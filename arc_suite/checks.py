@@ -559,6 +559,12 @@ def join_first(names: Sequence[str]) -> str:
     return ", ".join(names[:_MAX_NAMES]) + more
 
 
+def join_choices(names: Sequence[str]) -> str:
+    """Return names with commas between them, and "or" before the last one."""
+    *first_names, last_name = names
+    return f"{', '.join(first_names)} or {last_name}" if first_names else last_name
+
+
 def preview(value: Any) -> str:
     """Return the beginning of a value's `repr`, in one line, as errors show it. The value may be of any type."""
     try:

@@ -279,8 +279,8 @@ def suggest_similar_file(text: str, extensions: Iterable[str]) -> str:
     path = Path(text)
     extension_of_stem = {
         entry.removesuffix(extension): extension
-        for extension in extensions
         for entry in _list_folder(path.parent)
+        for extension in extensions
         if entry.endswith(extension) and (path.parent / entry).is_file()
     }
     matches = difflib.get_close_matches(path.name, extension_of_stem, n=1, cutoff=_LEAST_SIMILARITY)

@@ -87,8 +87,7 @@ def refuse_value(error: flags.IllegalFlagValueError) -> None:
     name, _, value = flag_and_value.removeprefix("flag --").partition("=")
     parser = flags.FLAGS[name].parser
     choices = getattr(parser, "enum_values", ("true", "false"))
-    *first_choices, last_choice = choices
-    expected = parser.syntactic_help or f"{', '.join(first_choices)} or {last_choice}"
+    expected = parser.syntactic_help or checks.join_choices(choices)
     hint = ""
     host, colon, port = value.rpartition(":")
     if name == "port" and colon and port.isdecimal():

@@ -6,7 +6,9 @@ from collections.abc import Iterable
 
 from absl import flags
 
-_BODY_FLAGS = ("robot", "spec", "legs", "links", "length", "palette", "layout", "scale")
+from arc_suite import checks
+
+_BODY_FLAGS = ("robot", "spec", "legs", "links", "length", "palette", "layout", "scale", "torso", "head", "tail")
 _BODY_FAMILY_FLAGS = ("family", "families", "around", "amount")
 _POLICY_FLAGS = ("policy", "preset", "vecnormalize", "algorithm", "hp", "prior", "checkpoint", "quality", "noise")
 _COMPARISON_FLAGS = ("compare", "compare_preset", "policies")
@@ -91,7 +93,7 @@ def _help_with_notes(flag: flags.Flag) -> str:
 def _values_text(parser: flags.ArgumentParser) -> str:
     """Return the names that a flag takes, or the numbers, such as "4 to 12"; "" for any."""
     if isinstance(parser, flags.EnumParser):
-        return " or ".join(parser.enum_values)
+        return checks.join_choices(parser.enum_values)
     low = getattr(parser, "lower_bound", None)
     high = getattr(parser, "upper_bound", None)
     if low is None:

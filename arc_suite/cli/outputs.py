@@ -41,10 +41,7 @@ def check_extension(path: str | os.PathLike[str], valid: Iterable[str]) -> str:
     try:
         return checks.extension(path, valid)
     except ValueError as error:
-        program = _PROGRAM_OF_EXTENSION.get(Path(path).suffix.lower())
-        if program is None:
-            raise
-        raise ValueError(f"{error}; {program}") from None
+        raise ValueError(f"{error}{_name_program(path)}") from None
 
 
 def check_folders(*names: str) -> None:
@@ -59,9 +56,7 @@ def check_folders(*names: str) -> None:
     for name in names:
         path = Path(flags.FLAGS[name].value or "")
         if path.suffix.lower() in _EXTENSIONS and not path.is_dir():
-            program = _PROGRAM_OF_EXTENSION.get(path.suffix.lower())
-            cure = f"; {program}" if program else ""
-            raise ValueError(f"--{name}={path}: expected a folder, got the name of a file{cure}")
+            raise ValueError(f"--{name}={path}: expected a folder, got the name of a file{_name_program(path)}")
 
 
 def check_json(path: str | None) -> None:
@@ -72,3 +67,9 @@ def check_json(path: str | None) -> None:
     """
     if path is not None and Path(path).suffix:
         check_extension(path, [".json"])
+
+
+def _name_program(path: str | os.PathLike[str]) -> str:
+    """Return the part of an error that names the program that writes files like this one; "" without one."""
+    program = _PROGRAM_OF_EXTENSION.get(Path(path).suffix.lower())
+    return f"; {program}" if program else ""

@@ -84,14 +84,12 @@ class Report(NamedTuple):
         achievement = self.progress[metric].mean
         if achievement >= _LEAST_ACHIEVEMENT:
             return ""
-        place = (
-            f"score {self.score:.2f} with {metric} {achievement:.2f}: score 1 is the return of the best demonstrator"
-        )
+        scores = f"score {self.score:.2f} with {metric} {achievement:.2f}"
+        meaning = "score 1 is the return of the best demonstrator"
         if self.preset == self.best_preset:
-            return f"{place}, which is this one"
-        return (
-            f"{place}, {self.best_preset}, whose {metric} may be as low: see --policy cpg --preset {self.best_preset}"
-        )
+            return f"{scores}: {meaning}, which is this one"
+        cure = f"see --policy cpg --preset {self.best_preset}"
+        return f"{scores}: {meaning}, {self.best_preset}, whose {metric} may be as low: {cure}"
 
     @property
     def of_the_paper(self) -> bool:

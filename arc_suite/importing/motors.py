@@ -367,15 +367,13 @@ def _gain_note(
     count = len(joints_of_legs) - len(sized_servos)
     if not sized_servos:
         return "gains: all servos have those of the file's position actuators"
-    stiffness_span = format_span(*_bounds([servo.stiffness for servo in sized_servos]))
-    damping_span = format_span(*_bounds([servo.damping for servo in sized_servos]))
+    stiffnesses = [servo.stiffness for servo in sized_servos]
+    dampings = [servo.damping for servo in sized_servos]
+    stiffness_span = format_span(min(stiffnesses), max(stiffnesses))
+    damping_span = format_span(min(dampings), max(dampings))
     stiffness_text = f"{'sized' if stiffness is None else 'chosen'} stiffness {stiffness_span} N m/rad"
     damping_text = f"{'sized' if damping is None else 'chosen'} damping {damping_span} N m s/rad"
-    place = "none in the file"
+    count_text = "none in the file"
     if count:
-        place = f"{count} of {len(joints_of_legs)} servos have those of the file's position actuators, the others"
-    return f"gains: {place}: {stiffness_text}, {damping_text}"
-
-
-def _bounds(values: Sequence[float]) -> tuple[float, float]:
-    return min(values), max(values)
+        count_text = f"{count} of {len(joints_of_legs)} servos have those of the file's position actuators, the others"
+    return f"gains: {count_text}: {stiffness_text}, {damping_text}"

@@ -24,13 +24,13 @@ from arc_suite.policies.network import Network
 TABLE = "final"
 COLUMNS = ("policy_sha256", "seed", "return", "length")  # the metrics of the task follow
 
-_NO_BAR = functools.partial(tqdm, disable=True)
+NO_BAR = functools.partial(tqdm, disable=True)
 
 Lines = list[dict[str, str]]
 
 
 def play_once(
-    run: Configuration, folder: Path, step: int, threads: int | None = 1, progress: Callable[..., Any] | None = None
+    run: Configuration, folder: Path, step: int, threads: int | None = 1, progress: Callable[..., Any] = NO_BAR
 ) -> Lines:
     """Return the rows of the episodes that judge the final policy of a run; play them if nobody has.
 
@@ -39,7 +39,7 @@ def play_once(
         folder: folder of the run.
         step: environment step of the policy.
         threads: threads of the simulation; None for as many as there are cores.
-        progress: makes a progress bar of control steps as `tqdm` does; None for no bar.
+        progress: makes a progress bar of control steps, as `tqdm` does.
 
     Raises:
         ValueError: a damaged file.
@@ -49,7 +49,7 @@ def play_once(
     sha256 = network.digest(policy)
     final_lines = run_folder.lines(folder, TABLE)
     if not are_of(final_lines, sha256):
-        final_lines = _play(run.validation, policy, sha256, threads, progress or _NO_BAR)
+        final_lines = _play(run.validation, policy, sha256, threads, progress)
         lines = [",".join(final_lines[0]), *(",".join(row.values()) for row in final_lines)]
         files.write(folder / f"{TABLE}.csv", "\n".join([*lines, ""]))
     return final_lines

@@ -64,7 +64,7 @@ def metadata(network: Network, training: Setup | None = None) -> dict:
         values["file_joints"] = list(body.file_joints)
     if "gait_clock" in network.blocks and task.parameters is not None:
         values["gait_clock"] = {"frequency": task.parameters.gait_frequency, "rule": _clock_rule(task)}
-    return values | dict(_timing(task, task if training is None else training.definition))
+    return values | dict(_timing(task, (training or network.setup).definition))
 
 
 def _clock_rule(task: Task) -> str:

@@ -98,7 +98,7 @@ def describe_machine(network: Network, training: Setup | None = None) -> dict[st
     gait = task.parameters
     follows_commands = "command" in task.unwrapped.blocks
     units = velocity_units(body, gait.target_velocity) if follows_commands else np.ones(3)
-    learned_task = task if training is None else training.definition
+    learned_task = (training or network.setup).definition
     ranges = learned_task.unwrapped.velocity_ranges or [(-1.0, 1.0)] * len(units)
     height = body.torso.standing_height
     return {

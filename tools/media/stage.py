@@ -83,8 +83,8 @@ def close(film: Sequence[np.ndarray], fade: int) -> list[np.ndarray]:
     closed = list(film[fade:])
     for number, before in enumerate(film[:fade]):
         share = (number + 1) / (fade + 1)
-        place = len(closed) - fade + number
-        closed[place] = np.rint((1.0 - share) * closed[place] + share * before).astype(np.uint8)
+        index = len(closed) - fade + number
+        closed[index] = np.rint((1.0 - share) * closed[index] + share * before).astype(np.uint8)
     return closed
 
 

@@ -198,9 +198,8 @@ def clip_of(name: str) -> Kind:
     file_cure = files.suggest_extension(name, (motion_files.EXTENSION,)) if is_unknown else ""
     if file_cure:
         raise ValueError(f"unknown clip {checks.preview(name)}{file_cure}")
-    clip_of_same_animation = clip_of_animation(name)
-    if is_unknown and clip_of_same_animation in clip_names():
-        raise ValueError(f"unknown clip {checks.preview(name)}; did you mean {clip_of_same_animation!r}?")
+    if is_unknown and clip_of_animation(name) in clip_names():
+        raise ValueError(f"unknown clip {checks.preview(name)}; did you mean {clip_of_animation(name)!r}?")
     clip = registry.find("clip", name, CLIPS)
     if not isinstance(clip, Kind):
         kinds = ", ".join(kind.__name__ for kind in get_args(Kind))

@@ -169,14 +169,18 @@ def main() -> int:
     outputs.check_folders("output")
     prepare_jax()
     runs = configurations_from_flags()
-    is_one_of_several = FLAGS["seed"].present > 1  # `train_seeds` adds a seed to flags that may have --jobs
-    if len(runs) == 1 and not is_one_of_several:
+    if len(runs) == 1 and not is_one_of_several():
         refuse_flags(["jobs"], "goes with several seeds, such as --seed=0,1,2")
     # Before the first step, as a score may be unreachable.
     threshold = None if FLAGS.until_score is None else outcomes.return_of_score(runs[0], FLAGS.until_score)
     if len(runs) == 1:
         return train_run(runs[0], threshold)
     return train_seeds_on_device(runs) if runs[0].learns_on_device else train_seeds(runs)
+
+
+def is_one_of_several() -> bool:
+    """Return whether `train_seeds` has started this process: it adds a seed to the flags, which may have --jobs."""
+    return FLAGS["seed"].present > 1
 
 
 def train_run(run: Configuration, threshold: float | None) -> int:
@@ -265,7 +269,7 @@ def play_final_episodes(run: Configuration, folder: Path, threads: int | None) -
     """Play the episodes that judge the final policy of a run, and print their result; keep the best one if asked to."""
     step = run_folder.read_progress(folder)["evaluated"]
     # The log of one of several seeds ends with its result, without the lines of a bar.
-    bar = progress if FLAGS["seed"].present <= 1 else None
+    bar = finals.NO_BAR if is_one_of_several() else progress
     print(f"{folder}: {finals.describe(run, finals.play_once(run, folder, step, threads, bar))}")
     if FLAGS.best:
         print(f"{folder}: {best.describe(*best.keep_best(run, folder, threads))}")
