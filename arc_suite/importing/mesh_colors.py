@@ -1,4 +1,4 @@
-"""Colors of visual meshes: those that the robot's file gives, else those of the materials next to an .obj file.
+"""Colors of what a robot shows: those that its file gives, else those of the materials next to an .obj file.
 
 Colors of textures are not read.
 """
@@ -15,6 +15,7 @@ import numpy as np
 from arc_suite import files
 
 _NO_COLOR = (0.5, 0.5, 0.5, 1.0)  # MuJoCo's color of geoms without one
+_MAX_SHOWN_GROUP = 2  # of geoms that MuJoCo's viewer shows unless it is asked for others
 _MAX_OBJ_BYTES = 1 << 25
 _MAX_MTL_BYTES = 1 << 20
 
@@ -43,14 +44,30 @@ def count_colored_visuals(robot: ElementTree.Element) -> int:
 
 
 def count_colored_geoms(spec: mujoco.MjSpec) -> int:
-    """Return how many geoms of an MJCF file have a color or a material, without those of the world."""
-    geoms = [geom for geom in spec.geoms if geom.parent.name != "world"]
+    """Return how many geoms that an MJCF file shows have a color or a material, without those of the world."""
+    geoms = [geom for geom in spec.geoms if geom.parent.name != "world" and is_shown(spec, geom)]
     return sum(bool(geom.material) or has_color(geom) for geom in geoms)
 
 
 def has_color(geom: mujoco.MjsGeom) -> bool:
     """Return whether the `rgba` of a geom is not MuJoCo's default."""
-    return not np.allclose(geom.rgba, _NO_COLOR)
+    return is_color(geom.rgba)
+
+
+def is_color(rgba: np.ndarray) -> bool:
+    """Return whether a color (4,) is not MuJoCo's default."""
+    return not np.allclose(rgba, _NO_COLOR)
+
+
+def is_shown(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> bool:
+    """Return whether MuJoCo's viewer shows a geom of an MJCF file unless it is asked for others."""
+    return geom.group <= _MAX_SHOWN_GROUP and find_rgba(spec, geom)[3] > 0.0
+
+
+def color_geoms(spec: mujoco.MjSpec) -> None:
+    """Give the geoms of an MJCF file the colors of their materials, and those that it does not show no color."""
+    for geom in spec.geoms:
+        geom.rgba = find_rgba(spec, geom) if is_shown(spec, geom) else _NO_COLOR
 
 
 def find_rgba(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> np.ndarray:

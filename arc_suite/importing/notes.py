@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.importing import drives, loops, trunk, visual_meshes
+from arc_suite.importing import drives, loops, mesh_colors, trunk, visual_meshes
 from arc_suite.importing.motors import format_span
 from arc_suite.importing.naming import Names
 from arc_suite.importing.opening import RobotFile
@@ -85,7 +85,10 @@ def omission_notes(file: RobotFile, robot: Robot, stance: Stance, names: Names) 
     for kind, count in _omission_counts(file, robot, stance).items():
         if count:
             yield f"left out: {count} {kind}"
-    yield visual_meshes.describe_visuals(file.visuals, file.colored_shapes)
+    bodies_with_visuals = file.visuals.bodies
+    shown_colliders = [geom for geom in robot.colliders if int(model.geom_bodyid[geom]) not in bodies_with_visuals]
+    colored_colliders = sum(mesh_colors.is_color(model.geom_rgba[geom]) for geom in shown_colliders)
+    yield visual_meshes.describe_visuals(file.visuals, file.colored_shapes, colored_colliders)
     yield "left out: contacts of the robot with itself"
     yield from _world_notes(robot)
     wheels = _find_wheels(robot, stance)

@@ -14,7 +14,7 @@ from arc_suite.importing import bounds, inertias, kinds, mesh_colors, missing_ma
 from arc_suite.importing.facing import LEVEL, Facing, turn_torso
 from arc_suite.importing.meshes import Mesh, file_of, meshes_of, text_length
 from arc_suite.importing.tree import FREE
-from arc_suite.importing.visual_meshes import Visuals, describe_lost_meshes, read_visuals
+from arc_suite.importing.visual_meshes import Visuals, can_touch, describe_lost_meshes, read_visuals
 from arc_suite.robots.spec import MAX_SOURCE, SpecError
 
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
@@ -37,7 +37,7 @@ class RobotFile(NamedTuple):
         model: compiled, with a free joint at the torso.
         root: body of the torso.
         meshes: meshes of geoms whose shape is a mesh, by geom.
-        visuals: visual meshes.
+        visuals: visual meshes and shapes.
         colored_shapes: number of shapes to which the file gives a color or a material.
         order: names of joints in the order of the file; empty if the model has that order.
         driven: names of the joints that a URDF drives; empty if it does not say.
@@ -148,6 +148,7 @@ def _read_spec(path: Path, root_element: ElementTree.Element) -> _Spec:
     spec = _with_short_errors(lambda: mujoco.MjSpec.from_file(str(path)))
     notes = references.delete_references(spec)
     colored_shapes = mesh_colors.count_colored_geoms(spec)
+    mesh_colors.color_geoms(spec)
     delete_visuals(spec)
     mesh_files = tuple(file_of(spec, mesh) for mesh in spec.meshes if mesh.file)
     return _Spec(spec, order=(), notes=notes, mesh_files=mesh_files, colored_shapes=colored_shapes)
@@ -201,8 +202,7 @@ def delete_visuals(spec: mujoco.MjSpec) -> None:
 
 def _is_visual_mesh(geom) -> bool:
     """Return whether a geom is a mesh that neither touches anything nor adds to the inertia of its body."""
-    can_touch = geom.contype or geom.conaffinity
-    return bool(geom.type == _MESH and not can_touch and geom.parent.explicitinertial)
+    return bool(geom.type == _MESH and not can_touch(geom) and geom.parent.explicitinertial)
 
 
 def _names_in_contact_pairs(spec: mujoco.MjSpec) -> set[str]:

@@ -1,4 +1,4 @@
-"""Visual meshes of a robot's file, simplified so that they stay with the body: pictures, clips and pages show them."""
+"""What a robot's file shows of it, so that pictures, clips and pages show it: visual meshes, simplified, and shapes."""
 
 import contextlib
 import xml.etree.ElementTree as ElementTree
@@ -19,7 +19,16 @@ _MAX_FILE_BYTES = 1 << 25  # of all files; larger ones take too long to read
 _MAX_POINTS = 8000  # of all meshes of a body, about 400 kB of its source
 _MIN_POINTS = 60  # of one mesh
 _FINEST_GRID = 256  # cells along the longest side of a mesh
+_MAX_SHAPES = 500  # with more, a robot shows its colliders
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
+# Kinds of shapes: names in MJCF, and how many numbers give their size.
+SHAPES = {
+    mujoco.mjtGeom.mjGEOM_SPHERE: ("sphere", 1),
+    mujoco.mjtGeom.mjGEOM_CAPSULE: ("capsule", 2),
+    mujoco.mjtGeom.mjGEOM_CYLINDER: ("cylinder", 2),
+    mujoco.mjtGeom.mjGEOM_ELLIPSOID: ("ellipsoid", 3),
+    mujoco.mjtGeom.mjGEOM_BOX: ("box", 3),
+}
 
 
 class Visual(NamedTuple):
@@ -40,24 +49,51 @@ class Visual(NamedTuple):
     is_of_obj: bool = False
 
 
+class VisualShape(NamedTuple):
+    """A visual sphere, capsule, cylinder, ellipsoid or box.
+
+    Attributes:
+        body: body of the file's model that shows it.
+        kind: kind of its geom.
+        size: (3,) as in MuJoCo, m.
+        position: (3,) in the body's frame, m.
+        orientation: (4,) in the body's frame, w first.
+        color: (3,) sRGB, 0 to 1; None if the file gives none.
+    """
+
+    body: int
+    kind: mujoco.mjtGeom
+    size: np.ndarray
+    position: np.ndarray
+    orientation: np.ndarray
+    color: np.ndarray | None = None
+
+
 class Visuals(NamedTuple):
-    """The visual meshes of a robot.
+    """What a robot's file shows in place of its colliders.
 
     Attributes:
         meshes: simplified.
+        shapes: all others.
         files: files that were read, with files of materials that are missing.
         point_count: number of points in these files.
     """
 
     meshes: tuple[Visual, ...] = ()
+    shapes: tuple[VisualShape, ...] = ()
     files: tuple[Path, ...] = ()
     point_count: int = 0
+
+    @property
+    def bodies(self) -> set[int]:
+        """Bodies of the file's model that show a mesh or a shape."""
+        return {visual.body for visual in self.meshes} | {shape.body for shape in self.shapes}
 
 
 def read_visuals(
     path: Path, root_element: ElementTree.Element, model: mujoco.MjModel, torso: int, facing: Facing, scale: float
 ) -> Visuals:
-    """Return the visual meshes of a file; none if any cannot be read.
+    """Return the visual meshes and shapes of a file; none if any cannot be read.
 
     Args:
         path: path of the file.
@@ -72,7 +108,8 @@ def read_visuals(
         files = tuple(dict.fromkeys(file_of(spec, mesh) for mesh in spec.meshes if mesh.file))
         bounds.check_mesh_files(files)
         is_small = sum(file.stat().st_size for file in files) <= _MAX_FILE_BYTES
-        if 0 < len(spec.meshes) <= _MAX_MESHES and is_small:
+        is_short = len(spec.meshes) <= _MAX_MESHES and len(spec.geoms) <= _MAX_SHAPES
+        if is_short and is_small:
             units.scale_lengths(spec, scale)
             materials = mesh_colors.read_materials(files)
             visuals = _collect_visuals(spec, model, torso, facing, materials)
@@ -94,27 +131,40 @@ def _read_visual_urdf(robot: ElementTree.Element, folder: Path) -> mujoco.MjSpec
     for geom in spec.geoms:
         if geom.name in colors:
             geom.rgba = colors[geom.name]
-    return _keep_meshes(spec)
+    return _keep_looks(spec)
 
 
 def _read_visual_mjcf(path: Path) -> mujoco.MjSpec:
-    """Return the spec of an MJCF file with its visual meshes as its only shapes."""
+    """Return the spec of an MJCF file with what it shows besides colliders as its only shapes.
+
+    Shapes may decorate colliders, such as eyes of a trunk: such colliders are among them. Meshes take their place.
+    """
     spec = mujoco.MjSpec.from_file(str(path))
-    for geom in list(spec.geoms):
-        if geom.contype or geom.conaffinity:
-            spec.delete(geom)
-    return _keep_meshes(spec)
+    for body in spec.bodies:
+        shown_geoms = [geom for geom in body.geoms if mesh_colors.is_shown(spec, geom)]
+        visual_geoms = [geom for geom in shown_geoms if not can_touch(geom)]
+        has_mesh = any(geom.type == _MESH for geom in visual_geoms)
+        kept_geoms = shown_geoms if visual_geoms and not has_mesh else visual_geoms
+        for geom in list(body.geoms):
+            if geom not in kept_geoms:
+                spec.delete(geom)
+    return _keep_looks(spec)
 
 
-def _keep_meshes(spec: mujoco.MjSpec) -> mujoco.MjSpec:
-    """Return a spec with its bodies and their meshes alone; masses do not matter here."""
+def can_touch(geom: mujoco.MjsGeom) -> bool:
+    """Return whether a geom of an MJCF file is a collider."""
+    return bool(geom.contype or geom.conaffinity)
+
+
+def _keep_looks(spec: mujoco.MjSpec) -> mujoco.MjSpec:
+    """Return a spec with its bodies, their meshes and shapes alone; masses do not matter here."""
     for kind in (spec.actuators, spec.sensors, spec.tendons, spec.equalities, spec.pairs, spec.excludes, spec.keys):
         for element in list(kind):
             spec.delete(element)
     for geom in list(spec.geoms):
         geom.rgba = mesh_colors.find_rgba(spec, geom)
         geom.material = ""
-        if geom.type != _MESH:
+        if geom.type != _MESH and geom.type not in SHAPES:
             spec.delete(geom)
     for element in (*spec.materials, *spec.textures, *spec.skins, *spec.hfields, *spec.cameras, *spec.lights):
         spec.delete(element)
@@ -135,16 +185,17 @@ def _collect_visuals(
     facing: Facing,
     materials: Mapping[Path, mesh_colors.Material],
 ) -> Visuals:
-    """Return the meshes of a spec whose bodies are those of the file's model, without their files."""
+    """Return the meshes and shapes of a spec whose bodies are those of the file's model, without the meshes' files."""
     triangles = {mesh.name: _read_mesh(spec, mesh) for mesh in spec.meshes}
     geoms = [(geom, geom.meshname) for geom in spec.geoms]
     file_of_mesh = {mesh.name: file_of(spec, mesh) for mesh in spec.meshes if mesh.file}
     colors = mesh_colors.find_colors(spec, file_of_mesh, materials)
     has_color = [mesh_colors.has_color(geom) for geom, _ in geoms]
-    for geom, _ in geoms:  # balls lie where the file puts meshes, and are compiled at once
-        geom.type = mujoco.mjtGeom.mjGEOM_SPHERE
-        geom.meshname = ""
-        geom.size[0] = 1.0
+    for geom, mesh_name in geoms:
+        if mesh_name:  # balls lie where the file puts meshes, and are compiled at once
+            geom.type = mujoco.mjtGeom.mjGEOM_SPHERE
+            geom.meshname = ""
+            geom.size[0] = 1.0
     for mesh in list(spec.meshes):
         spec.delete(mesh)
     places = spec.compile()
@@ -153,17 +204,28 @@ def _collect_visuals(
     ]:
         return Visuals()
     whole_visuals = []
+    shapes = []
     for (geom, mesh_name), color, is_of_file in zip(geoms, colors, has_color, strict=True):
         body = int(places.geom_bodyid[geom.id])
-        if places.body_rootid[body] == torso:
+        if places.body_rootid[body] != torso:
+            continue
+        position = places.geom_pos[geom.id]
+        orientation = places.geom_quat[geom.id]
+        if body == torso:
+            position = facing.rotation @ position
+            orientation = rotations.product(facing.quaternion, orientation)
+        if mesh_name:
             points, faces = triangles[mesh_name]
-            points = points @ rotations.matrix(places.geom_quat[geom.id]).T + places.geom_pos[geom.id]
-            turned_points = points @ facing.rotation.T if body == torso else points
-            whole_visuals.append(Visual(body, turned_points, faces, color, is_of_obj=not is_of_file))
+            placed_points = points @ rotations.matrix(orientation).T + position
+            whole_visuals.append(Visual(body, placed_points, faces, color, is_of_obj=not is_of_file))
+        else:
+            kind = mujoco.mjtGeom(places.geom_type[geom.id])
+            shapes.append(VisualShape(body, kind, places.geom_size[geom.id], position, orientation, color))
     point_count = sum(len(visual.points) for visual in whole_visuals)
     share = min(1.0, _MAX_POINTS / max(point_count, 1))
     visuals = [_simplify(visual, max(_MIN_POINTS, int(share * len(visual.points)))) for visual in whole_visuals]
-    return Visuals(tuple(visual for visual in visuals if len(visual.faces)), point_count=point_count)
+    meshes = tuple(visual for visual in visuals if len(visual.faces))
+    return Visuals(meshes, tuple(shapes), point_count=point_count)
 
 
 def _read_mesh(spec: mujoco.MjSpec, mesh) -> tuple[np.ndarray, np.ndarray]:
@@ -220,20 +282,29 @@ def _shorten_names(names: Sequence[str]) -> str:
     return checks.join_first([checks.quote(name.rpartition("/")[2]) for name in names])
 
 
-def describe_visuals(visuals: Visuals, colored_shapes: int) -> str:
+def describe_visuals(visuals: Visuals, colored_shapes: int, colored_colliders: int) -> str:
     """Return a line on what pictures show, and on colors that are left out.
 
     Args:
-        visuals: the visual meshes.
+        visuals: the visual meshes and shapes.
         colored_shapes: number of shapes to which the robot's file gives a color or a material.
+        colored_colliders: number of colliders that pictures show in a color of the file.
     """
-    kept_colors = sum(visual.color is not None and not visual.is_of_obj for visual in visuals.meshes)
-    lost = colored_shapes - kept_colors
+    colored_meshes = [visual for visual in visuals.meshes if visual.color is not None]
+    colored_by_obj = sum(visual.is_of_obj for visual in colored_meshes)
+    colored = len(colored_meshes) + sum(shape.color is not None for shape in visuals.shapes) + colored_colliders
+    lost = colored_shapes - (colored - colored_by_obj)
     lost_colors = f"; colors or textures of {lost} shapes are left out" if lost > 0 else ""
-    if not visuals.meshes:
-        return f"looks: pictures show the colliders, in colors of the suite{lost_colors}"
-    count = sum(len(visual.points) for visual in visuals.meshes)
-    reduction = f", with {count} of {visuals.point_count} points" if count < visuals.point_count else ""
-    colored = sum(visual.color is not None for visual in visuals.meshes)
+    if not visuals.meshes and not visuals.shapes:
+        colors = f"{colored_colliders} of them in the file's color" if colored_colliders else "in colors of the suite"
+        return f"looks: pictures show the colliders, {colors}{lost_colors}"
+    counts = {
+        "visual meshes": len(visuals.meshes),
+        "visual shapes": len(visuals.shapes),
+        "colliders": colored_colliders,
+    }
+    kinds = " and ".join(f"{count} {kind}" for kind, count in counts.items() if count)
+    point_count = sum(len(visual.points) for visual in visuals.meshes)
+    reduction = f", with {point_count} of {visuals.point_count} points" if point_count < visuals.point_count else ""
     colors = f", {colored} with the file's color" if colored else ""
-    return f"looks: {len(visuals.meshes)} visual meshes{reduction}{colors}, for pictures, clips and pages{lost_colors}"
+    return f"looks: {kinds}{reduction}{colors}, for pictures, clips and pages{lost_colors}"

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.importing import loops
+from arc_suite.importing import loops, mesh_colors
 from arc_suite.importing.facing import LEVEL
 from arc_suite.importing.loops import Loop
 from arc_suite.importing.meshes import Mesh
@@ -21,21 +21,12 @@ from arc_suite.importing.naming import Names
 from arc_suite.importing.opening import RobotFile
 from arc_suite.importing.poses import Leg, Stance
 from arc_suite.importing.tree import HINGE, Robot
-from arc_suite.importing.visual_meshes import Visuals
+from arc_suite.importing.visual_meshes import SHAPES, Visuals
 from arc_suite.models import source
 from arc_suite.models.mjcf_text import exact
 from arc_suite.robots import sources
 
 SITE = {"group": "4"}  # attributes of all sites; pictures do not show this group
-
-# Names of shapes in MJCF, and how many numbers give their size.
-_SHAPES = {
-    mujoco.mjtGeom.mjGEOM_SPHERE: ("sphere", 1),
-    mujoco.mjtGeom.mjGEOM_CAPSULE: ("capsule", 2),
-    mujoco.mjtGeom.mjGEOM_CYLINDER: ("cylinder", 2),
-    mujoco.mjtGeom.mjGEOM_ELLIPSOID: ("ellipsoid", 3),
-    mujoco.mjtGeom.mjGEOM_BOX: ("box", 3),
-}
 
 # Values that MuJoCo takes for attributes that are left out.
 _SOLREF = (0.02, 1.0)
@@ -151,19 +142,34 @@ def _add_meshes(root: ElementTree.Element, robot: Robot, meshes: dict[int, Mesh]
 
 
 def _add_visuals(root: ElementTree.Element, elements: Mapping[int, ElementTree.Element], visuals: Visuals) -> None:
-    """Add the visual meshes, in numbers of four digits, as nothing is computed with them."""
-    shown_visuals = [visual for visual in visuals.meshes if visual.body in elements]
+    """Add the visual meshes and shapes, in numbers of four digits, as nothing is computed with them."""
+    shown_meshes = [visual for visual in visuals.meshes if visual.body in elements]
+    shown_shapes = [shape for shape in visuals.shapes if shape.body in elements]
     asset = root.find("asset")
-    if shown_visuals and asset is None:
+    if shown_meshes and asset is None:
         asset = ElementTree.Element("asset")
         root.insert(list(root).index(root.find("worldbody")), asset)
-    for number, visual in enumerate(shown_visuals):
+    for number, visual in enumerate(shown_meshes):
         name = f"{sources.VISUAL}{number}"
-        points = " ".join(f"{coordinate:.4g}" for coordinate in visual.points.ravel())
         faces = " ".join(map(str, visual.faces.ravel().tolist()))
-        SubElement(asset, "mesh", name=name, inertia="shell", vertex=points, face=faces)
-        color = {} if visual.color is None else {"rgba": " ".join(f"{share:.3g}" for share in (*visual.color, 1.0))}
-        SubElement(elements[visual.body], "geom", name=name, mesh=name, **sources.VISUAL_GEOM, **color)
+        SubElement(asset, "mesh", name=name, inertia="shell", vertex=_round(visual.points), face=faces)
+        attributes = {"type": "mesh", "mesh": name, **sources.VISUAL_GEOM, **_format_color(visual.color)}
+        SubElement(elements[visual.body], "geom", name=name, **attributes)
+    for number, shape in enumerate(shown_shapes, start=len(shown_meshes)):
+        kind, size_count = SHAPES[shape.kind]
+        place = {"pos": _round(shape.position), "quat": _round(shape.orientation)}
+        attributes = {"type": kind, "size": _round(shape.size[:size_count]), **place, **sources.VISUAL_GEOM}
+        name = f"{sources.VISUAL}{number}"
+        SubElement(elements[shape.body], "geom", name=name, **attributes, **_format_color(shape.color))
+
+
+def _round(values: np.ndarray) -> str:
+    return " ".join(f"{value:.4g}" for value in values.ravel())
+
+
+def _format_color(color: np.ndarray | None) -> dict[str, str]:
+    """Return the attribute of a color (3,) of what is only shown; none where there is no color."""
+    return {} if color is None else {"rgba": " ".join(f"{share:.3g}" for share in (*color, 1.0))}
 
 
 def _add_body(
@@ -243,12 +249,14 @@ def _geom_attributes(model: mujoco.MjModel, geom: int, mesh_geom: dict[str, str]
     """
     contact_values = {name: getattr(model, f"geom_{name}")[geom] for name in _GEOM_DEFAULTS}
     contact = {"mass": "0", "contype": "1", "conaffinity": "0", **_format_differences(contact_values, _GEOM_DEFAULTS)}
+    rgba = model.geom_rgba[geom]
+    color = _format_color(rgba[:3].clip(0.0, 1.0) if mesh_colors.is_color(rgba) else None)
     if mesh_geom is not None:
-        return mesh_geom | contact
-    shape, size_count = _SHAPES[mujoco.mjtGeom(model.geom_type[geom])]
+        return mesh_geom | contact | color
+    shape, size_count = SHAPES[mujoco.mjtGeom(model.geom_type[geom])]
     pose = {"pos": model.geom_pos[geom], "quat": model.geom_quat[geom]}
     size = exact(model.geom_size[geom][:size_count])
-    return {"type": shape, "size": size, **_format_differences(pose, _BODY_DEFAULTS), **contact}
+    return {"type": shape, "size": size, **_format_differences(pose, _BODY_DEFAULTS), **contact, **color}
 
 
 def _add_leg_bodies(

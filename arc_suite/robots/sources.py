@@ -72,10 +72,10 @@ FLAGS = (
 )
 
 
-# Visual meshes and their geoms: names begin with this, and they touch nothing and weigh nothing.
+# Visual meshes, their geoms and other visual geoms: names begin with this, and they touch nothing and weigh nothing.
 VISUAL = "visual"
 VISUAL_GROUP = "2"
-VISUAL_GEOM = {"type": "mesh", "mass": "0", "contype": "0", "conaffinity": "0", "group": VISUAL_GROUP}
+VISUAL_GEOM = {"mass": "0", "contype": "0", "conaffinity": "0", "group": VISUAL_GROUP}
 
 
 class _Element(NamedTuple):
@@ -178,12 +178,13 @@ def check(body: Body) -> Body:
 
 
 def remove_visuals(root: ElementTree.Element) -> ElementTree.Element:
-    """Remove the visual meshes of a source from its tree, and return it: no dynamics depend on them."""
+    """Remove visual meshes, visual geoms and colors from the tree of a source, and return it: no dynamics change."""
     for parent in [element for element in root.iter() if element.tag in ("asset", "body")]:
         for child in list(parent):
             is_visual_mesh = child.tag == "mesh" and child.get("name", "").startswith(VISUAL)
             if is_visual_mesh or (child.tag == "geom" and child.get("group") == VISUAL_GROUP):
                 parent.remove(child)
+            child.attrib.pop("rgba", None)
     return root
 
 

@@ -120,7 +120,8 @@ def test_parts_and_joints_have_the_names_and_places_of_the_sketch(path):
         assert data.site(leg.full_name(leg.foot)).xpos[2] == pytest.approx(leg.foot.radius, abs=0.02)
         assert found.site(leg.full_name(leg.foot)).size[0] == leg.foot.radius
     assert found.joint("root").type == mujoco.mjtJoint.mjJNT_FREE
-    assert (found.geom_contype == 1).all() and (found.geom_conaffinity == 0).all()
+    collides = found.geom_group != 2  # others are only shown
+    assert (found.geom_contype == collides).all() and (found.geom_conaffinity == 0).all()
     assert found.nu == found.nsensor == found.ncam == found.nlight == found.ntendon == found.neq == 0
 
 

@@ -1,9 +1,10 @@
-"""Visual meshes stay with an imported body: pictures, clips and pages show them, and no dynamics change."""
+"""Visual meshes, shapes and colors stay with an imported body: pictures show them, and no dynamics change."""
 
 import importlib.util
 import pathlib
 import struct
 import sys
+import xml.etree.ElementTree as ElementTree
 
 import gltf_reader
 import mujoco
@@ -13,6 +14,7 @@ import pytest
 from arc_suite import models, registry
 from arc_suite.animation import clips, parts
 from arc_suite.importing import import_robot
+from arc_suite.robots import sources
 from arc_suite.robots.spec_files import body_from_json, body_to_json
 
 TESTS = pathlib.Path(__file__).parents[1]
@@ -90,7 +92,8 @@ def test_a_mesh_of_a_urdf_stays_in_its_place(tmp_path):
 
 def test_a_mesh_of_an_mjcf_file_stays_in_its_place(tmp_path):
     body, notes = import_robot(write_mjcf(tmp_path))
-    assert f"looks: 1 visual meshes, for pictures, clips and pages; {LOST_COLOR}" in notes  # of an ellipsoid
+    line = "looks: 1 visual meshes and 1 visual shapes, 1 with the file's color, for pictures, clips and pages"
+    assert line in notes  # the shape is an ellipsoid
     points = WEDGE * (0.2, 0.2, 0.5) - (0.0, 0.0, 0.1)
     assert in_order(visual_points(body, "l1_link3")) == pytest.approx(in_order(points), abs=1e-3)
 
@@ -211,16 +214,17 @@ def write_looks(folder, kind):
 @pytest.mark.parametrize("kind", ["mjcf", "urdf", "shared", "obj"])
 def test_a_mesh_keeps_its_color(kind, tmp_path):
     body, notes = import_robot(write_looks(tmp_path, kind))
-    line = "looks: 1 visual meshes, 1 with the file's color, for pictures, clips and pages"
-    assert (f"{line}; {LOST_COLOR}" if kind == "mjcf" else line) in notes
+    counts = "1 visual meshes and 1 visual shapes, 2" if kind == "mjcf" else "1 visual meshes, 1"
+    assert f"looks: {counts} with the file's color, for pictures, clips and pages" in notes
     assert body_from_json(body_to_json(body)) == body
+    name = "visual_color1" if kind == "mjcf" else "visual_color0"  # after that of an ellipsoid
     described, materials = parts.describe_body(body)
-    assert materials["visual_color0"].color == pytest.approx((0.1, 0.2, 0.3), abs=1e-6)
-    assert [shape.kind for part in described for shape in part.shapes if shape.material == "visual_color0"] == ["hull"]
-    assert "visual_color0" not in parts.describe_body(body.replace(palette="moss"))[1]
+    assert materials[name].color == pytest.approx((0.1, 0.2, 0.3), abs=1e-6)
+    assert [shape.kind for part in described for shape in part.shapes if shape.material == name] == ["hull"]
+    assert name not in parts.describe_body(body.replace(palette="moss"))[1]
     for options in ({}, {"uv": True}, {"triangles": 800}):
         file = gltf_reader.read(clips.glb(body, [], **options))
-        (material,) = [place for place, each in enumerate(file.json["materials"]) if each["name"] == "visual_color0"]
+        (material,) = [place for place, each in enumerate(file.json["materials"]) if each["name"] == name]
         color = file.json["materials"][material]["pbrMetallicRoughness"]["baseColorFactor"]
         assert color == pytest.approx((0.01, 0.033, 0.073, 1.0), abs=1e-3)  # linear
         primitives = [primitive for mesh in file.json["meshes"] for primitive in mesh["primitives"]]
@@ -238,16 +242,109 @@ def test_a_color_that_is_none_is_left_out(rgba, tmp_path):
 
 
 def test_colors_that_pictures_lack_are_counted(tmp_path):
-    material = '<material name="white"/></visual>'
+    text = A1.read_text()
+    path = tmp_path / "robot.urdf"
+    path.write_text(text.replace("</visual>", '<material name="white"/></visual>'))
+    lost = f"colors or textures of {text.count('</visual>')} shapes are left out"
+    assert f"{COLLIDERS}; {lost}" in import_robot(path).notes
+
+    path = tmp_path / "robot.xml"
+    path.write_text(GO2.read_text().replace('rgba="0.9 0.9 0.9 1"', 'material="grid"'))  # which is a texture
+    assert f"looks: 1 visual shapes, for pictures, clips and pages; {LOST_COLOR}" in import_robot(path).notes
+
+
+SHIN = '<link name="FL_calf">'
+SHAPES = """
+<visual><origin xyz="0.01 0 -0.1" rpy="0 0 1.5707963267948966"/><geometry><box size="0.02 0.04 0.2"/></geometry>
+  <material name="blue"><color rgba="0.1 0.2 0.8 1"/></material></visual>
+<visual><geometry><cylinder radius="0.03" length="0.05"/></geometry></visual>
+<visual><geometry><sphere radius="0.025"/></geometry></visual>
+"""
+
+
+def shown_geoms(body, part):
+    """Return kind, color and visibility of the geoms of a part in pictures, by name."""
+    model = models.model_spec(body, decorated=True).compile()
+    shown = {}
+    for index in range(model.ngeom):
+        geom = model.geom(index)
+        if geom.bodyid[0] == model.body(part).id and geom.group[0] == 0:
+            rgba = model.mat_rgba[geom.matid[0]]
+            shown[geom.name] = (
+                mujoco.mjtGeom(geom.type[0]).name[7:].lower(),
+                *rgba[:3].astype(float).round(2).tolist(),
+            )
+    return shown
+
+
+def test_shapes_of_a_urdf_stay_in_their_places(tmp_path):
+    text = A1.read_text()
+    assert text.count(SHIN) == 1
+    first, rest = text.split(SHIN)
+    mesh_visual = rest[rest.index("<visual>") : rest.index("</visual>") + len("</visual>")]
+    path = tmp_path / "robot.urdf"
+    path.write_text(first + SHIN + rest.replace(mesh_visual, SHAPES, 1))
+    body, notes = import_robot(path)
+    assert "looks: 3 visual shapes, 1 with the file's color, for pictures, clips and pages" in notes
+    assert body_from_json(body_to_json(body)) == body and same_bits(path, body) == 200
+    shown = shown_geoms(body, "l1_link3")
+    assert shown["visual0"] == ("box", 0.1, 0.2, 0.8)
+    assert (shown["visual1"][0], shown["visual2"][0]) == ("cylinder", "sphere")
+    assert "l1_link3_geom0" not in shown and "r1_link3_geom0" in shown_geoms(body, "r1_link3")
+    model = mujoco.MjModel.from_xml_string(body.source)
+    box = model.geom("visual0")
+    assert (box.pos, box.size) == (pytest.approx((0.01, 0.0, -0.1)), pytest.approx((0.01, 0.02, 0.1)))
+    assert abs(box.quat) == pytest.approx((0.5**0.5, 0.0, 0.0, 0.5**0.5), abs=1e-4)
+    half = mujoco.MjModel.from_xml_string(import_robot(path, scale=0.5).body.source).geom("visual0")
+    assert (half.pos, half.size) == (pytest.approx((0.005, 0.0, -0.05)), pytest.approx((0.005, 0.01, 0.05)))
+
+
+def test_a_shape_of_a_torso_turns_with_it(tmp_path):
+    path = tmp_path / "robot.xml"
+    path.write_text(
+        GO2.read_text().replace('class="looks" type="ellipsoid"', 'class="looks" pos="0.1 0 0" type="ellipsoid"')
+    )
+    geom = mujoco.MjModel.from_xml_string(import_robot(path, forward="-y").body.source).geom("visual0")
+    assert geom.pos == pytest.approx((0.0, 0.1, 0.0), abs=1e-6)  # the file's x is to the left
+    assert abs(geom.quat) == pytest.approx((0.5**0.5, 0.0, 0.0, 0.5**0.5), abs=1e-4)
+
+
+def test_colliders_keep_the_colors_that_a_file_shows(tmp_path):
+    foot = '<geom name="FL" class="foot"'
     texts = {
-        "robot.urdf": (A1, "</visual>", material),
-        "robot.xml": (GO2, '<geom name="FL" class="foot"', '<geom name="FL" rgba="1 0 0 1" class="foot"'),
+        "shown": GO2.read_text().replace(foot, '<geom name="FL" group="0" rgba="1 0 0 1" class="foot"'),
+        "of a material": GO2.read_text()
+        .replace(foot, '<geom name="FL" group="0" material="red" class="foot"')
+        .replace("<asset>", '<asset><material name="red" rgba="1 0 0 1"/>'),
+        "hidden": GO2.read_text().replace(foot, '<geom name="FL" group="3" rgba="1 0 0 1" class="foot"'),
+        "clear": GO2.read_text().replace(foot, '<geom name="FL" group="0" rgba="1 0 0 0" class="foot"'),
     }
-    for name, (file, old, new) in texts.items():
-        text = file.read_text()
-        (tmp_path / name).write_text(text.replace(old, new))
-        count = text.count(old) + (file == GO2)  # which has a colored ellipsoid; its floor has a material
-        assert f"{COLLIDERS}; colors or textures of {count} shapes are left out" in import_robot(tmp_path / name).notes
+    for name, text in texts.items():
+        path = tmp_path / f"{name}.xml"
+        path.write_text(text)
+        body, notes = import_robot(path)
+        colliders = " and 1 colliders, 2" if name in ("shown", "of a material") else ", 1"
+        assert f"looks: 1 visual shapes{colliders} with the file's color, for pictures, clips and pages" in notes, name
+        colors = [color[1:] for part in body.part_names for color in shown_geoms(body, part).values()]
+        assert ((1.0, 0.0, 0.0) in colors) == (name in ("shown", "of a material")), name
+        assert same_bits(path, body) == 200
+        assert "rgba" not in ElementTree.tostring(
+            sources.remove_visuals(ElementTree.fromstring(body.source)), "unicode"
+        )
+        painted = body.replace(palette="moss")
+        colors = [color[1:] for part in body.part_names for color in shown_geoms(painted, part).values()]
+        assert (1.0, 0.0, 0.0) not in colors
+
+
+def test_a_shape_decorates_colliders_that_a_file_shows(tmp_path):
+    path = tmp_path / "robot.xml"
+    trunk = '<geom type="box" size="0.19 0.0468 0.057"/>'
+    shown_trunk = trunk.replace("/>", ' group="0"/>')
+    assert trunk in GO2.read_text()
+    path.write_text(GO2.read_text().replace(trunk, shown_trunk))
+    body, notes = import_robot(path)
+    assert "looks: 2 visual shapes, 1 with the file's color, for pictures, clips and pages" in notes
+    assert sorted(kind for kind, *_ in shown_geoms(body, "torso").values()) == ["box", "ellipsoid"]
 
 
 def test_materials_of_an_obj_file_are_read_in_its_folder_alone(tmp_path):
