@@ -291,6 +291,13 @@ def test_shapes_of_a_urdf_stay_in_their_places(tmp_path):
     assert shown["visual0"] == ("box", 0.1, 0.2, 0.8)
     assert (shown["visual1"][0], shown["visual2"][0]) == ("cylinder", "sphere")
     assert "l1_link3_geom0" not in shown and "r1_link3_geom0" in shown_geoms(body, "r1_link3")
+    described, materials = parts.describe_body(body)
+    shin = next(part for part in described if part.name == "l1_link3")
+    assert [(shape.kind, shape.material) for shape in shin.shapes][:2] == [
+        ("box", "visual_color0"),
+        ("cylinder", "limb"),
+    ]
+    assert materials["visual_color0"].color == pytest.approx((0.1, 0.2, 0.8), abs=1e-6)
     model = mujoco.MjModel.from_xml_string(body.source)
     box = model.geom("visual0")
     assert (box.pos, box.size) == (pytest.approx((0.01, 0.0, -0.1)), pytest.approx((0.01, 0.02, 0.1)))

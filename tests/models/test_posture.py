@@ -58,4 +58,6 @@ def test_a_body_that_takes_poses_by_command_rests_where_its_joints_have_room():
     assert (low <= -0.05).all() and (high >= 0.05).all()
     # Others keep their pose.
     for name in ("queen", "bastion", "tick"):
-        assert posture.find_pose_with_room(ROBOTS[name]) is posture.find_rest_pose(ROBOTS[name])
+        pose, rest = posture.find_pose_with_room(ROBOTS[name]), posture.find_rest_pose(ROBOTS[name])
+        np.testing.assert_array_equal(pose.joint_angles, rest.joint_angles)
+        np.testing.assert_array_equal(pose.sole_positions, rest.sole_positions)
