@@ -11,7 +11,7 @@ import numpy as np
 
 from arc_suite import checks, rotations
 from arc_suite.importing import bounds, mesh_colors, units, urdf
-from arc_suite.importing.facing import Facing
+from arc_suite.importing.facing import LEVEL, Facing
 from arc_suite.importing.meshes import file_of
 
 _MAX_MESHES = 100  # with more, a robot shows its colliders
@@ -108,8 +108,8 @@ def read_visuals(
         files = tuple(dict.fromkeys(file_of(spec, mesh) for mesh in spec.meshes if mesh.file))
         bounds.check_mesh_files(files)
         is_small = sum(file.stat().st_size for file in files) <= _MAX_FILE_BYTES
-        is_short = len(spec.meshes) <= _MAX_MESHES and len(spec.geoms) <= _MAX_SHAPES
-        if is_short and is_small:
+        are_few = len(spec.meshes) <= _MAX_MESHES and len(spec.geoms) <= _MAX_SHAPES
+        if are_few and is_small:
             units.scale_lengths(spec, scale)
             materials = mesh_colors.read_materials(files)
             visuals = _collect_visuals(spec, model, torso, facing, materials)
@@ -131,7 +131,7 @@ def _read_visual_urdf(robot: ElementTree.Element, folder: Path) -> mujoco.MjSpec
     for geom in spec.geoms:
         if geom.name in colors:
             geom.rgba = colors[geom.name]
-    return _keep_looks(spec)
+    return _keep_visuals(spec)
 
 
 def _read_visual_mjcf(path: Path) -> mujoco.MjSpec:
@@ -148,7 +148,7 @@ def _read_visual_mjcf(path: Path) -> mujoco.MjSpec:
         for geom in list(body.geoms):
             if geom not in kept_geoms:
                 spec.delete(geom)
-    return _keep_looks(spec)
+    return _keep_visuals(spec)
 
 
 def can_touch(geom: mujoco.MjsGeom) -> bool:
@@ -156,7 +156,7 @@ def can_touch(geom: mujoco.MjsGeom) -> bool:
     return bool(geom.contype or geom.conaffinity)
 
 
-def _keep_looks(spec: mujoco.MjSpec) -> mujoco.MjSpec:
+def _keep_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
     """Return a spec with its bodies, their meshes and shapes alone; masses do not matter here."""
     for kind in (spec.actuators, spec.sensors, spec.tendons, spec.equalities, spec.pairs, spec.excludes, spec.keys):
         for element in list(kind):
@@ -209,11 +209,7 @@ def _collect_visuals(
         body = int(places.geom_bodyid[geom.id])
         if places.body_rootid[body] != torso:
             continue
-        position = places.geom_pos[geom.id]
-        orientation = places.geom_quat[geom.id]
-        if body == torso:
-            position = facing.rotation @ position
-            orientation = rotations.product(facing.quaternion, orientation)
+        position, orientation = _find_place(places, geom.id, facing if body == torso else LEVEL)
         if mesh_name:
             points, faces = triangles[mesh_name]
             placed_points = points @ rotations.matrix(orientation).T + position
@@ -226,6 +222,12 @@ def _collect_visuals(
     visuals = [_simplify(visual, max(_MIN_POINTS, int(share * len(visual.points)))) for visual in whole_visuals]
     meshes = tuple(visual for visual in visuals if len(visual.faces))
     return Visuals(meshes, tuple(shapes), point_count=point_count)
+
+
+def _find_place(model: mujoco.MjModel, geom: int, facing: Facing) -> tuple[np.ndarray, np.ndarray]:
+    """Return position (3,), m, and orientation (4,) of a geom in its body's frame, turned as by `turn_torso`."""
+    orientation = rotations.product(facing.quaternion, model.geom_quat[geom])
+    return facing.rotation @ model.geom_pos[geom], orientation
 
 
 def _read_mesh(spec: mujoco.MjSpec, mesh) -> tuple[np.ndarray, np.ndarray]:
