@@ -191,19 +191,11 @@ def _collect_visuals(
     file_of_mesh = {mesh.name: file_of(spec, mesh) for mesh in spec.meshes if mesh.file}
     colors = mesh_colors.find_colors(spec, file_of_mesh, materials)
     has_color = [mesh_colors.has_color(geom) for geom, _ in geoms]
-    for geom, mesh_name in geoms:
-        if mesh_name:  # balls lie where the file puts meshes, and are compiled at once
-            geom.type = mujoco.mjtGeom.mjGEOM_SPHERE
-            geom.meshname = ""
-            geom.size[0] = 1.0
-    for mesh in list(spec.meshes):
-        spec.delete(mesh)
-    places = spec.compile()
-    if [places.body(body).name for body in range(places.nbody)] != [
-        model.body(body).name for body in range(model.nbody)
-    ]:
+    places = _compile_places(spec)
+    names = [places.body(body).name for body in range(places.nbody)]
+    if names != [model.body(body).name for body in range(model.nbody)]:
         return Visuals()
-    whole_visuals = []
+    whole_meshes = []
     shapes = []
     for (geom, mesh_name), color, is_of_file in zip(geoms, colors, has_color, strict=True):
         body = int(places.geom_bodyid[geom.id])
@@ -213,15 +205,24 @@ def _collect_visuals(
         if mesh_name:
             points, faces = triangles[mesh_name]
             placed_points = points @ rotations.matrix(orientation).T + position
-            whole_visuals.append(Visual(body, placed_points, faces, color, is_of_obj=not is_of_file))
+            whole_meshes.append(Visual(body, placed_points, faces, color, is_of_obj=not is_of_file))
         else:
             kind = mujoco.mjtGeom(places.geom_type[geom.id])
             shapes.append(VisualShape(body, kind, places.geom_size[geom.id], position, orientation, color))
-    point_count = sum(len(visual.points) for visual in whole_visuals)
-    share = min(1.0, _MAX_POINTS / max(point_count, 1))
-    visuals = [_simplify(visual, max(_MIN_POINTS, int(share * len(visual.points)))) for visual in whole_visuals]
-    meshes = tuple(visual for visual in visuals if len(visual.faces))
-    return Visuals(meshes, tuple(shapes), point_count=point_count)
+    point_count = sum(len(visual.points) for visual in whole_meshes)
+    return Visuals(_simplify_meshes(whole_meshes, point_count), tuple(shapes), point_count=point_count)
+
+
+def _compile_places(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """Return the compiled model of a spec, in which balls lie where the file puts meshes: it is compiled at once."""
+    for geom in spec.geoms:
+        if geom.meshname:
+            geom.type = mujoco.mjtGeom.mjGEOM_SPHERE
+            geom.meshname = ""
+            geom.size[0] = 1.0
+    for mesh in list(spec.meshes):
+        spec.delete(mesh)
+    return spec.compile()
 
 
 def _find_place(model: mujoco.MjModel, geom: int, facing: Facing) -> tuple[np.ndarray, np.ndarray]:
@@ -237,6 +238,18 @@ def _read_mesh(spec: mujoco.MjSpec, mesh) -> tuple[np.ndarray, np.ndarray]:
     faces = np.array(whole_mesh.userface, np.int64).reshape(-1, 3)
     points = (points - mesh.refpos) @ rotations.matrix(mesh.refquat)
     return points * mesh.scale, faces
+
+
+def _simplify_meshes(meshes: Sequence[Visual], point_count: int) -> tuple[Visual, ...]:
+    """Return meshes that have `_MAX_POINTS` together, as far as each needs a few, without those that lose all faces.
+
+    Args:
+        meshes: meshes of a robot.
+        point_count: number of their points.
+    """
+    share = min(1.0, _MAX_POINTS / max(point_count, 1))
+    simplified_meshes = [_simplify(mesh, max(_MIN_POINTS, int(share * len(mesh.points)))) for mesh in meshes]
+    return tuple(mesh for mesh in simplified_meshes if len(mesh.faces))
 
 
 def _simplify(visual: Visual, max_points: int) -> Visual:
