@@ -44,20 +44,23 @@ def _same(body: Body, file: mujoco.MjSpec) -> int:
             joint.armature = ours.dof_armature[theirs.jnt_dofadr[joint.id]]
     theirs = file.compile()
     home, random = ours.key("home").qpos, np.random.default_rng(0)
-    return sum(_equal(ours, theirs, home, random) for _ in range(STATES))
+    pairs = [(model, mujoco.MjData(model)) for model in (ours, theirs)]
+    return sum(_equal(pairs, home, random) for _ in range(STATES))
 
 
-def _equal(ours: mujoco.MjModel, theirs: mujoco.MjModel, home: np.ndarray, random: np.random.Generator) -> bool:
+def _equal(pairs, home: np.ndarray, random: np.random.Generator) -> bool:
+    """Return whether models with their data have the same accelerations in a random state."""
+    ours = pairs[0][0]
     qpos = home.copy()
     qpos[2] *= random.uniform(0.95, 1.05)
     qpos[7:] += random.uniform(-0.3, 0.3, len(qpos) - 7)
     qvel, torque = random.normal(size=ours.nv), 0.3 * ours.body_mass.sum() * random.normal(size=ours.nv)
     found = []
-    for model in (ours, theirs):
-        data = mujoco.MjData(model)
+    for model, data in pairs:
+        mujoco.mj_resetData(model, data)
         data.qpos[:], data.qvel[:], data.qfrc_applied[:] = qpos, qvel, torque
         mujoco.mj_forward(model, data)
-        found.append(data.qacc)
+        found.append(data.qacc.copy())
     return np.isfinite(found[0]).all() and np.array_equal(*found)
 
 
