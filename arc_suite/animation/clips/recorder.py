@@ -21,6 +21,7 @@ from arc_suite.tasks import Task
 from arc_suite.tasks.fitting import velocity_units
 
 _SETTLE_STEPS = 200  # control steps, after which starts and changes of command are forgotten
+_SAG_STEPS = 700  # control steps, after which a leg without motors hardly sags any further
 _STEPS_WITHOUT_COMMAND = 700  # control steps of a recording: a speed that varies is that of most of an episode
 _CYCLES_UNDER_COMMAND = 20  # gait cycles of a recording, to choose loops from
 _CYCLES_BEFORE_STOP = 2  # gait cycles of a recording of a stop and a start
@@ -162,10 +163,13 @@ class Recorder:
             fixed_commands["pose"] = (-self._limit_crouch(crouch), 0.0, 0.0, 0.0, 0.0, 0.0)
         clock = self._clock(setup)
         steps = round(_CYCLES_UNDER_COMMAND * clock.cycle / clock.control_timestep)
-        recording = self._record(setup, _SETTLE_STEPS, steps, [(0, command)], lift=lift, **fixed_commands)
-        if lift != 1.0 and loops.find_closings(recording, clock.cycle, most_cycles=1)[1].seam > loops.MAX_SEAM:
-            recording = self._record(setup, _SETTLE_STEPS, steps, [(0, command)], **fixed_commands)
-        phase = (_SETTLE_STEPS * clock.control_timestep / clock.cycle + clock.offset) % 1.0
+        settle = _SETTLE_STEPS
+        recording = self._record(setup, settle, steps, [(0, command)], lift=lift, **fixed_commands)
+        if (lift != 1.0 or failing is not None) and not _closes(recording, clock):
+            if failing is not None:
+                settle = self._limit_settling(setup, steps)
+            recording = self._record(setup, settle, steps, [(0, command)], **fixed_commands)
+        phase = (settle * clock.control_timestep / clock.cycle + clock.offset) % 1.0
         return GaitRecording(recording, clock.cycle, phase)
 
     def record_free_walk(self) -> GaitRecording:
@@ -252,6 +256,11 @@ class Recorder:
             raise ValueError(f"the legs fold by {room:.2f} of their height; a crouch takes {_MIN_CROUCH:g}")
         return min(depth, room)
 
+    def _limit_settling(self, setup: Setup, steps: int) -> int:
+        """Return the control steps in which a leg sags, or as many as an episode leaves before a recording."""
+        most_steps = setup.definition.step_limit - steps - 1
+        return int(max(_SETTLE_STEPS, min(_SAG_STEPS, most_steps)))
+
     def _choose_frequency(self, tempo: float) -> float:
         """Return a multiple of the frequency of the gait, Hz, at which a cycle is a whole number of control steps.
 
@@ -304,6 +313,11 @@ class Recorder:
             if isinstance(preset, SteppingParameters):
                 return Demonstrator(task, preset._replace(lift=lift * preset.lift))
         return named_policy(self._policy, self.body, self._preset, task=task)
+
+
+def _closes(recording: Recording, clock: _Clock) -> bool:
+    """Return whether a pose returns after one cycle."""
+    return loops.find_closings(recording, clock.cycle, most_cycles=1)[1].seam <= loops.MAX_SEAM
 
 
 def _find_gait(recording: Recording) -> GaitRecording:

@@ -17,7 +17,7 @@ LEFT_OUT_OF_BODY = {
     "hound": {},
     "spider": {"tuned": "spider has no preset tuned"},
     "random_14": {
-        "limp": "the pose does not return within 2 degrees: 2.6 after 1 cycles",
+        "limp": "the pose does not return within 2 degrees: 2.4 after 1 cycles",
         "refined": "random_14 has no preset refined",
     },
     "random_21": {"get_up": "it does not get up from its back within 4 s"},

@@ -17,6 +17,8 @@ from arc_suite import policies, rotations
 from arc_suite.animation import clips as export
 from arc_suite.animation.clips import bounds, foot_contacts, getting_up, loops, passages, recordings
 from arc_suite.animation.clips.catalog import CLIPS, WalkLoop
+from arc_suite.animation.clips.recorder import Recorder
+from arc_suite.bodies.families import sound_body
 from arc_suite.bodies.generator import random_body
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import policy
@@ -571,3 +573,19 @@ def test_every_clip_can_be_made(robot):
             assert abs(missed).max() < 0.27, name
     speeds = [clips[name].motion.twist[0] for name in ("slow", "walk", "fast") if name in clips]
     assert all(faster > 1.1 * slower for slower, faster in itertools.pairwise(speeds))
+
+
+@pytest.mark.slow
+def test_a_leg_that_sags_for_long_limps_in_a_loop():
+    recorder = Recorder(Setup.of(sound_body(15), "steer"), "cpg", None)
+    gait = recorder.record_walk((1.0, 0.0, 0.0), failing=0)
+    assert loops.find_closings(gait.recording, gait.cycle, 1)[1].seam < 0.25 * loops.MAX_SEAM
+    sound = recorder.record_walk((1.0, 0.0, 0.0))
+    assert gait.phase != sound.phase and len(gait.recording.poses) == len(sound.recording.poses)
+    # Feet of both gaits touch down at the same phase.
+    touchdowns = []
+    for recording in (gait, sound):
+        begin, cycle = recording.samples_to_touchdown(0), round(gait.cycle / gait.recording.time_step)
+        touchdowns.append(foot_contacts.sole_heights(recorder.body, recording.recording.poses[begin:][:cycle]))
+    legs = slice(1, None)  # without the leg that fails
+    assert np.corrcoef(touchdowns[0][:, legs].ravel(), touchdowns[1][:, legs].ravel())[0, 1] > 0.9
