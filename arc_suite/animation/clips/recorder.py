@@ -167,7 +167,7 @@ class Recorder:
         recording = self._record(setup, settle, steps, [(0, command)], lift=lift, **fixed_commands)
         if (lift != 1.0 or failing is not None) and not _closes(recording, clock):
             if failing is not None:
-                settle = self._limit_settling(setup, steps)
+                settle = self._choose_settling(setup, steps)
             recording = self._record(setup, settle, steps, [(0, command)], **fixed_commands)
         phase = (settle * clock.control_timestep / clock.cycle + clock.offset) % 1.0
         return GaitRecording(recording, clock.cycle, phase)
@@ -256,7 +256,7 @@ class Recorder:
             raise ValueError(f"the legs fold by {room:.2f} of their height; a crouch takes {_MIN_CROUCH:g}")
         return min(depth, room)
 
-    def _limit_settling(self, setup: Setup, steps: int) -> int:
+    def _choose_settling(self, setup: Setup, steps: int) -> int:
         """Return the control steps in which a leg sags, or as many as an episode leaves before a recording."""
         most_steps = setup.definition.step_limit - steps - 1
         return int(max(_SETTLE_STEPS, min(_SAG_STEPS, most_steps)))
