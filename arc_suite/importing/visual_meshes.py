@@ -12,7 +12,7 @@ import numpy as np
 from arc_suite import checks, rotations
 from arc_suite.importing import bounds, mesh_colors, units, urdf
 from arc_suite.importing.facing import LEVEL, Facing
-from arc_suite.importing.meshes import file_of
+from arc_suite.importing.meshes import compile_without_meshes, file_of
 
 _MAX_MESHES = 100  # with more, a robot shows its colliders
 _MAX_FILE_BYTES = 1 << 25  # of all files; larger ones take too long to read
@@ -191,38 +191,26 @@ def _collect_visuals(
     file_of_mesh = {mesh.name: file_of(spec, mesh) for mesh in spec.meshes if mesh.file}
     colors = mesh_colors.find_colors(spec, file_of_mesh, materials)
     has_color = [mesh_colors.has_color(geom) for geom, _ in geoms]
-    places = _compile_places(spec)
-    names = [places.body(body).name for body in range(places.nbody)]
+    spec_model = compile_without_meshes(spec)
+    names = [spec_model.body(body).name for body in range(spec_model.nbody)]
     if names != [model.body(body).name for body in range(model.nbody)]:
         return Visuals()
     whole_meshes = []
     shapes = []
     for (geom, mesh_name), color, is_of_file in zip(geoms, colors, has_color, strict=True):
-        body = int(places.geom_bodyid[geom.id])
-        if places.body_rootid[body] != torso:
+        body = int(spec_model.geom_bodyid[geom.id])
+        if spec_model.body_rootid[body] != torso:
             continue
-        position, orientation = _find_place(places, geom.id, facing if body == torso else LEVEL)
+        position, orientation = _find_place(spec_model, geom.id, facing if body == torso else LEVEL)
         if mesh_name:
             points, faces = triangles[mesh_name]
             placed_points = points @ rotations.matrix(orientation).T + position
             whole_meshes.append(Visual(body, placed_points, faces, color, is_of_obj=not is_of_file))
         else:
-            kind = mujoco.mjtGeom(places.geom_type[geom.id])
-            shapes.append(VisualShape(body, kind, places.geom_size[geom.id], position, orientation, color))
+            kind = mujoco.mjtGeom(spec_model.geom_type[geom.id])
+            shapes.append(VisualShape(body, kind, spec_model.geom_size[geom.id], position, orientation, color))
     point_count = sum(len(visual.points) for visual in whole_meshes)
     return Visuals(_simplify_meshes(whole_meshes, point_count), tuple(shapes), point_count=point_count)
-
-
-def _compile_places(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """Return the compiled model of a spec, in which balls lie where the file puts meshes: it is compiled at once."""
-    for geom in spec.geoms:
-        if geom.meshname:
-            geom.type = mujoco.mjtGeom.mjGEOM_SPHERE
-            geom.meshname = ""
-            geom.size[0] = 1.0
-    for mesh in list(spec.meshes):
-        spec.delete(mesh)
-    return spec.compile()
 
 
 def _find_place(model: mujoco.MjModel, geom: int, facing: Facing) -> tuple[np.ndarray, np.ndarray]:

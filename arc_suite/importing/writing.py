@@ -157,8 +157,8 @@ def _add_visuals(root: ElementTree.Element, elements: Mapping[int, ElementTree.E
         SubElement(elements[visual.body], "geom", name=name, **attributes)
     for number, shape in enumerate(shown_shapes, start=len(shown_meshes)):
         kind, size_count = SHAPES[shape.kind]
-        place = {"pos": _round(shape.position), "quat": _round(shape.orientation)}
-        attributes = {"type": kind, "size": _round(shape.size[:size_count]), **place, **sources.VISUAL_GEOM}
+        pose = {"pos": _round(shape.position), "quat": _round(shape.orientation)}
+        attributes = {"type": kind, "size": _round(shape.size[:size_count]), **pose, **sources.VISUAL_GEOM}
         name = f"{sources.VISUAL}{number}"
         SubElement(elements[shape.body], "geom", name=name, **attributes, **_format_color(shape.color))
 

@@ -263,7 +263,7 @@ SHAPES = """
 
 
 def shown_geoms(body, part):
-    """Return kind, color and visibility of the geoms of a part in pictures, by name."""
+    """Return kind and color of the geoms of a part that pictures show, by name."""
     model = models.model_spec(body, decorated=True).compile()
     shown = {}
     for index in range(model.ngeom):
@@ -352,6 +352,15 @@ def test_a_shape_decorates_colliders_that_a_file_shows(tmp_path):
     body, notes = import_robot(path)
     assert "looks: 2 visual shapes, 1 with the file's color, for pictures, clips and pages" in notes
     assert sorted(kind for kind, *_ in shown_geoms(body, "torso").values()) == ["box", "ellipsoid"]
+
+
+def test_a_box_that_fits_a_mesh_stands_beside_the_mesh(tmp_path):
+    path = write_mjcf(tmp_path)
+    foot = '<geom name="FL" class="foot"'
+    colliders = '<geom type="box" mesh="calf" pos="0 0 -0.1"/><geom type="mesh" mesh="calf" pos="0 0 -0.1"/>'
+    path.write_text(path.read_text().replace(foot, f"{colliders}{foot}"))
+    body = import_robot(path).body
+    assert body.source.count('type="mesh"') == 2 and same_bits(path, body) == 200
 
 
 def test_materials_of_an_obj_file_are_read_in_its_folder_alone(tmp_path):
