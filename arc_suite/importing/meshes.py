@@ -62,7 +62,7 @@ def meshes_of(spec: mujoco.MjSpec, model: mujoco.MjModel) -> dict[int, Mesh]:
     whole_meshes = {name: _whole_mesh(spec, spec.mesh(name)) for name in dict.fromkeys(name_of_geom.values())}
     hulls = {name: _hull(model, geom) for geom, name in name_of_geom.items()}
     whole_names = _choose_whole_meshes(whole_meshes, hulls)
-    model_without_meshes = compile_without_meshes(spec.copy())
+    model_without_meshes = compile_with_balls(spec.copy())
     meshes = {}
     for geom, name in name_of_geom.items():
         is_whole = name in whole_names
@@ -147,7 +147,7 @@ def _text_length(attributes: Mapping[str, str]) -> int:
     return sum(len(text) for text in attributes.values())
 
 
-def compile_without_meshes(spec: mujoco.MjSpec) -> mujoco.MjModel:
+def compile_with_balls(spec: mujoco.MjSpec) -> mujoco.MjModel:
     """Return the model of a spec, which is changed: balls in place of meshes lie where the file puts the meshes."""
     for geom in spec.geoms:
         if geom.meshname:

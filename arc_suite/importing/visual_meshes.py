@@ -12,7 +12,7 @@ import numpy as np
 from arc_suite import checks, rotations
 from arc_suite.importing import bounds, mesh_colors, units, urdf
 from arc_suite.importing.facing import LEVEL, Facing
-from arc_suite.importing.meshes import compile_without_meshes, file_of
+from arc_suite.importing.meshes import compile_with_balls, file_of
 
 _MAX_MESHES = 100  # with more, a robot shows its colliders
 _MAX_FILE_BYTES = 1 << 25  # of all files; larger ones take too long to read
@@ -191,7 +191,7 @@ def _collect_visuals(
     file_of_mesh = {mesh.name: file_of(spec, mesh) for mesh in spec.meshes if mesh.file}
     colors = mesh_colors.find_colors(spec, file_of_mesh, materials)
     has_color = [mesh_colors.has_color(geom) for geom, _ in geoms]
-    spec_model = compile_without_meshes(spec)
+    spec_model = compile_with_balls(spec)
     names = [spec_model.body(body).name for body in range(spec_model.nbody)]
     if names != [model.body(body).name for body in range(model.nbody)]:
         return Visuals()
