@@ -380,4 +380,6 @@ def _durations(count: int, seconds: float, unit: int) -> list[int]:
     return [unit * (end - start) for start, end in itertools.pairwise(ends)]
 
 
-WRITERS = {".png": write_png, ".mp4": write_mp4, ".gif": write_gif, ".webp": write_webp}
+FILM_WRITERS = {".mp4": write_mp4, ".gif": write_gif, ".webp": write_webp}
+FILM_EXTENSIONS = tuple(FILM_WRITERS)
+WRITERS = {".png": write_png, **FILM_WRITERS}

@@ -39,11 +39,10 @@ from arc_suite.simulation import films
 
 _DEFAULT_STEPS = {".png": 60, ".mp4": 200, ".gif": 80, ".webp": 80, ".html": 400}  # control steps
 _DEFAULT_SIZES = {".png": (640, 480), ".mp4": (640, 480), ".gif": (240, 180), ".webp": (480, 360)}  # pixels
-_FILM_EXTENSIONS = (".mp4", ".gif", ".webp")
-_VIEW_EXTENSIONS = (".png", *_FILM_EXTENSIONS)  # a page has a camera and a size of its own
+_VIEW_EXTENSIONS = (".png", *films.FILM_EXTENSIONS)  # a page has a camera and a size of its own
 _EXTENSIONS_OF_FLAG = {  # flags for some files only
-    "fps": _FILM_EXTENSIONS,
-    "loop": _FILM_EXTENSIONS,
+    "fps": films.FILM_EXTENSIONS,
+    "loop": films.FILM_EXTENSIONS,
     "camera": _VIEW_EXTENSIONS,
     "width": _VIEW_EXTENSIONS,
     "height": _VIEW_EXTENSIONS,

@@ -25,9 +25,8 @@ from arc_suite.robots.spec import Body
 from arc_suite.simulation import films
 
 GLB_EXTENSION = ".glb"
-FILM_EXTENSIONS = (".mp4", ".gif", ".webp")
 SHEET_EXTENSION = ".png"
-EXTENSIONS = (GLB_EXTENSION, motion_files.EXTENSION, *FILM_EXTENSIONS, SHEET_EXTENSION)
+EXTENSIONS = (GLB_EXTENSION, motion_files.EXTENSION, *films.FILM_EXTENSIONS, SHEET_EXTENSION)
 
 # The extensions of files that take an option.
 OPTION_EXTENSIONS = {
@@ -37,9 +36,9 @@ OPTION_EXTENSIONS = {
     "uv": (GLB_EXTENSION,),
     "reduce": (GLB_EXTENSION,),
     "transparent": (".webp", SHEET_EXTENSION),  # formats that have an alpha channel
-    "turntable": FILM_EXTENSIONS,
+    "turntable": films.FILM_EXTENSIONS,
     "directions": (SHEET_EXTENSION,),
-    "size": (*FILM_EXTENSIONS, SHEET_EXTENSION),
+    "size": (*films.FILM_EXTENSIONS, SHEET_EXTENSION),
 }
 OPTION_BOUNDS = {"size": (16, MAX_HEIGHT), "directions": (1, 64), "triangles": (1, None)}  # least and greatest value
 DEFAULT_SIZE = 480  # pixels, width and height of a picture
