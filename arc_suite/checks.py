@@ -1,5 +1,6 @@
 """Checks of names, seeds and numbers. Each returns the checked value, or raises an error in the same wording."""
 
+import contextlib
 import difflib
 import json
 import math
@@ -8,7 +9,7 @@ import os
 import pkgutil
 import re
 import sys
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -551,6 +552,39 @@ def json_text(what: str, value: Any) -> str:
 def quote(value: Any) -> str:
     """Return the beginning of a value's text, in one line; for texts of unknown length, such as foreign errors."""
     return " ".join(str(value).split())[:_MAX_QUOTE]
+
+
+def differences(record: Mapping, other: Mapping, prefix: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """Yield the name of each field in which two JSON-able records differ, and its values; None where it is missing.
+
+    Mappings, lists of as many mappings and texts of JSON objects are compared field by field: `robot.legs.0.mount`.
+
+    Args:
+        record: the first record.
+        other: the second one, whose fields come first.
+        prefix: beginning of all names.
+    """
+    for field in dict.fromkeys((*other, *record)):
+        value = record.get(field)
+        other_value = other.get(field)
+        if value == other_value:
+            continue
+        fields = _fields_of(value)
+        other_fields = _fields_of(other_value)
+        if fields is None or other_fields is None or (isinstance(value, list) and len(fields) != len(other_fields)):
+            yield f"{prefix}{field}", value, other_value
+        else:
+            yield from differences(fields, other_fields, f"{prefix}{field}.")
+
+
+def _fields_of(value: Any) -> Mapping | None:
+    """Return the fields of a mapping, of a list of mappings or of the text of a JSON object; None for other values."""
+    if isinstance(value, str) and value.startswith("{"):
+        with contextlib.suppress(ValueError, RecursionError):
+            value = json.loads(value)
+    if isinstance(value, list) and value and all(isinstance(element, Mapping) for element in value):
+        return dict(enumerate(value))
+    return value if isinstance(value, Mapping) else None
 
 
 def join_first(names: Sequence[str]) -> str:

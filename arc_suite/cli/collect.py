@@ -33,7 +33,7 @@ from arc_suite.cli.flags import (
 )
 from arc_suite.cli.program import progress
 from arc_suite.cpg import suited_preset
-from arc_suite.cpg.selection import check_preset_name
+from arc_suite.cpg.selection import check_preset_name, preset_names
 from arc_suite.envs.prepare import checked_limit
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import checkpoints
@@ -56,7 +56,8 @@ flags.DEFINE_enum(
 flags.DEFINE_list(
     "preset",
     None,
-    f"{policies.PRESET_HELP} Several with commas take turns. [default: the one that suits the task and the body]",
+    f"{policies.PRESET_HELP} Several with commas take turns: of n, the episode with seed s has number s modulo n. "
+    "[default: the one that suits the task and the body]",
 )
 flags.DEFINE_float("noise", 0.0, "Standard deviation of normal noise on actions.", lower_bound=0.0)
 flags.DEFINE_integer(
@@ -116,6 +117,8 @@ def main() -> None:
         raise ValueError(f"--id={FLAGS.id}: names one dataset, and --robot=all makes {len(setups)}")
     for name in FLAGS.preset or ():
         policies.check_preset(FLAGS.policy, name)
+        if name in checkpoints.QUALITIES and name not in preset_names():
+            raise ValueError(f"--preset={name}: is a quality of a run's policy, as in --policy RUN --quality {name}")
         check_preset_name(name)
     policy, label = policy_and_label()
     for judged_setup in setups.values():
@@ -138,7 +141,7 @@ def main() -> None:
         if collected_episodes:
             print(f"{dataset_id}: {describe_dataset(dataset)}")
         else:
-            print(f"{dataset_id}: has its {len(dataset)} episodes already")
+            print(f"{dataset_id}: has {len(dataset)} episodes already; --episodes={FLAGS.episodes} asks for no more")
 
 
 def _verify(setup: Setup) -> None:

@@ -8,7 +8,7 @@ another body, or of other settings, is measured in these ten, too. Where it earn
 still, a line says so in place of a score. Where a score of at least 0.5 comes with less than half of the distance or
 the tracking, a line says whose return has the score 1. With --preset medium, which is the paper's demonstrator, the
 table ends with the paper's return. A policy that learned from the episodes is refused. The JSON holds every episode,
-and hashes of policy, body, model and task.
+in the order of the seeds, the anchors of the score, and hashes of policy, body, model and task.
 
   arc-suite evaluate --robot all --policy cpg --episodes 10
   arc-suite evaluate --spec spider
@@ -70,10 +70,10 @@ def main() -> None:
             robots={name: report.to_json() for name, report in zip(setups, reports_of_robots, strict=True)},
             versions=versions.dependency_versions(),
         )
-        all_have_experts = all(report.expert is not None for report in reports_of_robots)
-        if len(reports_of_robots) > 1 and all_have_experts:
-            overall_share = share_of_expert_returns(reports_of_robots)
-            json_content["return_over_expert"] = overall_share
+        are_published = all(report.paper_return is not None for report in reports_of_robots)
+        if len(reports_of_robots) > 1 and are_published:
+            overall_share = share_of_paper_returns(reports_of_robots)
+            json_content["return_over_paper"] = overall_share
             if any(report.of_the_paper for report in reports_of_robots):
                 text = "all          IQM of return / paper's cpg: {:.3f} [{:.3f}, {:.3f}]"
                 print(text.format(overall_share["iqm"], *overall_share["interval"]))
@@ -96,8 +96,8 @@ def print_reports(players: list[reports.Player], seeds: range) -> list[evaluatio
     return reports_of_robots
 
 
-def share_of_expert_returns(reports_of_robots: list[evaluation.Report]) -> dict:
+def share_of_paper_returns(reports_of_robots: list[evaluation.Report]) -> dict:
     """Return the returns of all robots as shares of the paper's demonstrators', with robots as strata."""
-    shares = [[episode.total / report.expert for episode in report.episodes] for report in reports_of_robots]
+    shares = [[episode.total / report.paper_return for episode in report.episodes] for report in reports_of_robots]
     iqm, interval = evaluation.iqm_and_interval(shares)
     return {"iqm": iqm, "interval": interval}

@@ -169,7 +169,9 @@ def read_metadata(dataset_id: str, folder: Path) -> dict:
     with explain_damage(dataset_id, path):
         metadata = files.read_json(path)
     if not isinstance(metadata, dict) or "arc_suite" not in metadata:
-        raise ValueError(f"dataset {dataset_id!r} was not collected by arc_suite")
+        combined = isinstance(metadata, dict) and metadata.get("combined_datasets")
+        origin = "was combined by Minari, which keeps no seeds" if combined else "was not collected by arc_suite"
+        raise ValueError(f"dataset {dataset_id!r} {origin}")
     with explain_damage(dataset_id, path):
         suite_metadata = metadata["arc_suite"]
         _check_type("versions of arc_suite", suite_metadata["versions"], dict)

@@ -34,7 +34,7 @@ class EpisodeResult(NamedTuple):
     progress: Mapping[str, float]
 
 
-def expert_return(setup: Setup) -> float | None:
+def paper_return(setup: Setup) -> float | None:
     """Return the return of the paper's demonstrator; None for a task, settings or a robot that the paper lacks."""
     return published.DEMONSTRATORS.get(setup.name) if _is_published(setup) else None
 

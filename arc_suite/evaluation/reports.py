@@ -58,9 +58,9 @@ class Report(NamedTuple):
         flaw: see `anchors.Anchors.flaw`.
         length: control steps.
         progress: the task's metrics by name.
-        expert: return of the paper's demonstrator; None for other setups than the paper's.
+        paper_return: return of the paper's demonstrator; None for other setups than the paper's.
         episodes: all episodes, in the order of their seeds.
-        best_preset: preset of the demonstrator whose return has the score 1; None if there is none.
+        scale: returns that have the scores 0 and 1.
     """
 
     setup: Setup
@@ -71,9 +71,9 @@ class Report(NamedTuple):
     flaw: str
     length: Summary
     progress: Mapping[str, Summary]
-    expert: float | None
+    paper_return: float | None
     episodes: Sequence[EpisodeResult]
-    best_preset: str | None = None
+    scale: anchors.Anchors
 
     @property
     def caution(self) -> str:
@@ -86,15 +86,15 @@ class Report(NamedTuple):
             return ""
         scores = f"score {self.score:.2f} with {metric} {achievement:.2f}"
         meaning = "score 1 is the return of the best demonstrator"
-        if self.preset == self.best_preset:
+        if self.preset == self.scale.preset:
             return f"{scores}: {meaning}, which is this one"
-        cure = f"see --policy cpg --preset {self.best_preset}"
-        return f"{scores}: {meaning}, {self.best_preset}, whose {metric} may be as low: {cure}"
+        cure = f"see --policy cpg --preset {self.scale.preset}"
+        return f"{scores}: {meaning}, {self.scale.preset}, whose {metric} may be as low: {cure}"
 
     @property
     def of_the_paper(self) -> bool:
         """Whether the paper's demonstrator was evaluated; then the table ends with the return in the paper."""
-        return self.expert is not None and self.preset == "medium"
+        return self.paper_return is not None and self.preset == "medium"
 
     @property
     def label(self) -> str:
@@ -118,7 +118,7 @@ class Report(NamedTuple):
             f"{self.length.mean:.1f}",
         ]
         if self.of_the_paper:
-            cells.append(f"{self.expert:.0f}")
+            cells.append(f"{self.paper_return:.0f}")
         metrics = {name: f"{summary.mean:.3f}" for name, summary in self.progress.items()}
         return _line(self.label.ljust(width), metrics, cells)
 
@@ -132,10 +132,11 @@ class Report(NamedTuple):
             "provenance": provenance.of_setup(self.setup),
             "preset": self.preset,
             "zero_return": self.zero,
-            "expert_return": self.expert,
+            "paper_return": self.paper_return,
             "return": self.returns,
             "score": self.score,
             "no_score": self.flaw,
+            "anchors": {field: getattr(self.scale, field) for field in ("zero", "demonstrator", "preset")},
             "length": self.length,
             **self.progress,
             "episodes": self.episodes,
@@ -239,9 +240,9 @@ def report(
         flaw=scale.flaw,
         length=statistics.summary([episode.length for episode in episodes]),
         progress={name: statistics.summary([episode.progress[name] for episode in episodes]) for name in metrics},
-        expert=protocol.expert_return(setup),
+        paper_return=protocol.paper_return(setup),
         episodes=episodes,
-        best_preset=scale.preset,
+        scale=scale,
     )
 
 

@@ -15,10 +15,11 @@ from tqdm import tqdm
 
 from arc_suite import evaluation, files
 from arc_suite.envs.setup import Setup
+from arc_suite.envs.vector import VectorEnv
 from arc_suite.evaluation import anchors, judging
 from arc_suite.learning.agents import run_folder
 from arc_suite.learning.agents.configuration import Configuration
-from arc_suite.policies import checkpoints, network
+from arc_suite.policies import Policy, checkpoints, network
 from arc_suite.policies.network import Network
 
 TABLE = "final"
@@ -67,11 +68,26 @@ def _play(setup: Setup, policy: Network, sha256: str, threads: int | None, progr
     environment = judging.setup_of(setup, seeds).make_vec(
         len(seeds), num_threads=threads, autoreset_mode=AutoresetMode.DISABLED
     )
-    description = f"judging in {len(seeds)} episodes"
-    calls = int(np.max(environment.step_limit)) + 1  # of `watch`: one after the reset
-    with contextlib.closing(environment), progress(desc=description, total=calls, unit="step") as bar:
-        episodes = evaluation.episodes_in_batch(environment, policy, seeds, watch=lambda *masks: bar.update())
+    with contextlib.closing(environment):
+        episodes = play_batch(environment, policy, seeds, progress, f"judging in {len(seeds)} episodes")
     return to_lines(sha256, seeds, episodes)
+
+
+def play_batch(
+    environment: VectorEnv, policy: Policy, seeds: Sequence[int], progress: Callable[..., Any], description: str
+) -> list[evaluation.EpisodeResult]:
+    """Run one episode for each seed behind a progress bar of control steps; see `evaluation.episodes_in_batch`.
+
+    Args:
+        environment: vector environment with one environment for each seed.
+        policy: made for as many environments.
+        seeds: seeds of the episodes.
+        progress: makes a progress bar as `tqdm` does.
+        description: text before the bar.
+    """
+    calls = int(np.max(environment.step_limit)) + 1  # of `watch`: one after the reset
+    with progress(desc=description, total=calls, unit="step", leave=False) as bar:
+        return evaluation.episodes_in_batch(environment, policy, seeds, watch=lambda *masks: bar.update())
 
 
 def to_lines(sha256: str, seeds: Sequence[int], episodes: Sequence[evaluation.EpisodeResult]) -> Lines:

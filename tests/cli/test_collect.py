@@ -32,7 +32,8 @@ def test_collect_continue_verify_and_minaris_own_command(root):
     total = sum(summary["return"] for summary in data.open(ID).summaries()) / 3
     assert out.startswith(f"{ID}: 3 episodes, return {total:.1f}, deviation ")
     assert out.endswith(f", length 20.0, 0.1 MB in {root / ID}\n")
-    assert programs.passed(run("--steps=20", "--episodes=3")) == f"{ID}: has its 3 episodes already\n"
+    line = f"{ID}: has 3 episodes already; --episodes=3 asks for no more\n"
+    assert programs.passed(run("--steps=20", "--episodes=3")) == line
     assert programs.passed(run(f"--verify={ID}")) == f"{ID}: 3 episodes replayed, all bit-equal\n"
     minari = pathlib.Path(sys.executable).with_name("minari")
     listed = subprocess.run([minari, "list", "local"], capture_output=True, text=True, check=True).stdout
@@ -69,6 +70,7 @@ def test_datasets_have_other_falls_than_judges(root):
             "at least before the last '/', and a version at the end alone, such as 'queen/cpg-v0'",
         ),
         (["--id="], "--id=: expected a value, got none"),
+        (["--preset=expert"], "--preset=expert: is a quality of a run's policy, as in --policy RUN --quality expert"),
         (["--noise=-1"], "flag --noise=-1: expected a non-negative number"),
     ],
 )

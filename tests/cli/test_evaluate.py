@@ -66,7 +66,7 @@ def test_the_papers_returns_stand_beside_medium_alone(tmp_path):
     assert list(rows) == list(ROBOTS) and (over_all is None) == (RETURNS.keys() != ROBOTS.keys())
     if over_all:
         assert re.match(r"all +IQM of return / paper's cpg: 1\.0\d\d \[\d\.\d{3}, \d\.\d{3}\]$", over_all)
-        assert json.loads(path.read_text())["return_over_expert"]["iqm"] == pytest.approx(1.0, abs=0.05)
+        assert json.loads(path.read_text())["return_over_paper"]["iqm"] == pytest.approx(1.0, abs=0.05)
     for robot, returns in RETURNS.items():
         assert rows[robot].split()[-1] == f"{returns.paper:.0f}"
 
@@ -103,8 +103,9 @@ def test_the_preset_is_the_one_that_suits_task_and_body(tmp_path):
 def test_a_caution_names_the_demonstrator(score, metrics, preset, line):
     means = {name: statistics.summary([value]) for name, value in metrics.items()}
     setup = Setup.of("queen", "rough")
-    values = {"returns": means, "zero": 0.0, "flaw": "", "length": means, "expert": None, "episodes": ()}
-    report = reports.Report(setup, preset, score=score, progress=means, best_preset="climbing", **values)
+    values = {"returns": means, "zero": 0.0, "flaw": "", "length": means, "paper_return": None, "episodes": ()}
+    scale = anchors.Anchors(0.0, 1.0, "climbing")
+    report = reports.Report(setup, preset, score=score, progress=means, scale=scale, **values)
     assert line in report.caution if line else report.caution == ""
 
 
@@ -143,13 +144,13 @@ def test_json_holds_every_episode_and_the_versions(tmp_path):
     assert len(totals) == 3
     assert figures["return"]["mean"] == pytest.approx(sum(totals) / 3)
     assert figures["length"]["episodes"] == 3
-    assert figures["expert_return"] == RETURNS["leaper"].paper
+    assert figures["paper_return"] == RETURNS["leaper"].paper
     for package in ("mujoco", "dm_control", "numpy"):
         assert report["versions"][package] == importlib.metadata.version(package)
     assert "arc_suite" in report["versions"]
 
 
-def test_another_task_than_the_papers_has_no_expert(tmp_path):
+def test_another_task_than_the_papers_has_no_return_of_the_paper(tmp_path):
     path = tmp_path / "evaluation.json"
     changed = ("--set=target_velocity=0.25", '--set=weights={"posture": -0.01}', "--set=gait=wave")
     short = ("--policy=random", "--episodes=1", "--set=time_limit=5")
@@ -158,8 +159,8 @@ def test_another_task_than_the_papers_has_no_expert(tmp_path):
     report = json.loads(path.read_text())
     settings = {"target_velocity": 0.25, "weights": {"posture": -0.01}, "gait": "wave", "time_limit": 5}
     assert (report["task"], report["task_kwargs"]) == ("walk", settings)
-    assert "return_over_expert" not in report
-    assert {figures["expert_return"] for figures in report["robots"].values()} == {None}
+    assert "return_over_paper" not in report
+    assert {figures["paper_return"] for figures in report["robots"].values()} == {None}
     assert evaluated("--robot=queen", *short)[2].split()[4] != rows[0][4]
 
 

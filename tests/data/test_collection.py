@@ -1,5 +1,6 @@
 """Datasets: Minari opens them, they replay bit-exactly, and they depend on nothing but seeds and settings."""
 
+import dataclasses
 import sys
 
 import gaitless
@@ -13,6 +14,7 @@ from refusals import refused
 from tiers import never, tiers
 
 from arc_suite import data
+from arc_suite.bodies import generator
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
 
@@ -193,7 +195,7 @@ def test_another_dataset_under_the_id_is_refused_and_overwritten_at_will(kept):
         (SETTINGS._replace(presets=("fast", "medium")), "its presets is ['medium'], and not ['fast', 'medium']"),
         (SETTINGS._replace(setup=TICK), "its robot is 'queen', and not 'tick'"),
         (SETTINGS._replace(setup=Setup.of("queen", "steer")), "its task is 'walk', and not 'steer'"),
-        (SETTINGS._replace(setup=WAVE), "its task_kwargs is {}, and not {'gait': 'wave'}"),
+        (SETTINGS._replace(setup=WAVE), "its task_kwargs.gait is None, and not 'wave'"),
     ):
         with refused(f"dataset {ID!r} is another: {difference}; overwrite=True (--overwrite) replaces it"):
             collect(ID, changed, 2)
@@ -207,6 +209,17 @@ def test_another_dataset_under_the_id_is_refused_and_overwritten_at_will(kept):
     assert digests()[0] == before[1]
     assert len(data.open(ID)) == 3
     assert [path.name for path in (kept / ID).parent.iterdir() if path.is_dir()] == ["some-v0"]
+
+
+def test_the_field_that_differs_in_a_body_of_the_same_name_is_named():
+    settings = data.DatasetSettings(Setup.of(generator.generate(5, 3)), **SHORT)
+    collect(ID, settings, 1)
+    changed = settings._replace(
+        setup=Setup.of(dataclasses.replace(generator.generate(5, 3), palette="#3a5f2b,#d8c48a"))
+    )
+    line = "its robot.palette is None, and not '#3a5f2b,#d8c48a'; overwrite=True (--overwrite) replaces it"
+    with refused(f"dataset {ID!r} is another: {line}"):
+        collect(ID, changed, 2)
 
 
 @pytest.mark.slow

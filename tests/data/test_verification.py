@@ -88,3 +88,12 @@ def test_another_version_or_model_is_refused(kept):
         with pytest.raises(ValueError, match=f"^dataset '{ID}' was not collected by arc_suite$"):
             use(ID)
     assert len(minari.load_dataset(ID)) == 2
+
+
+def test_datasets_that_minari_combined_are_refused():
+    first, second = "arc_suite/queen/walk/first-v0", "arc_suite/queen/walk/second-v0"
+    collect(first, SETTINGS, 1)
+    collect(second, SETTINGS._replace(seed=10_100), 1)
+    minari.combine_datasets([minari.load_dataset(first), minari.load_dataset(second)], "both-v0")
+    with refused("dataset 'both-v0' was combined by Minari, which keeps no seeds"):
+        data.open("both-v0")

@@ -48,7 +48,7 @@ def test_names_that_the_suite_lacks_stay():
 
 def test_figures_of_the_paper_are_those_of_its_robots():
     own, real = Setup.of(impostor("queen")), Setup.of("queen")
-    assert evaluation.expert_return(real) and evaluation.expert_return(own) is None
+    assert evaluation.paper_return(real) and evaluation.paper_return(own) is None
     assert (
         evaluation.published_returns(real, ["sac"], 10**6) and evaluation.published_returns(own, ["sac"], 10**6) == {}
     )

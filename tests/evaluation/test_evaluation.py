@@ -71,10 +71,10 @@ def test_watchers_see_every_step_in_the_environment():
 
 def test_returns_of_the_papers_demonstrators():
     for robot, returns in RETURNS.items():
-        assert evaluation.expert_return(Setup.of(robot)) == returns.paper
-        assert evaluation.expert_return(Setup.of(robot, "steer")) is None
-        assert evaluation.expert_return(Setup.of(robot, "walk", {"gait": "wave"})) is None
-    assert evaluation.expert_return(Setup.of(generator.generate(4, 2))) is None
+        assert evaluation.paper_return(Setup.of(robot)) == returns.paper
+        assert evaluation.paper_return(Setup.of(robot, "steer")) is None
+        assert evaluation.paper_return(Setup.of(robot, "walk", {"gait": "wave"})) is None
+    assert evaluation.paper_return(Setup.of(generator.generate(4, 2))) is None
 
 
 def test_a_final_policy_is_judged_on_100_episodes():

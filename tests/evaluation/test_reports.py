@@ -24,6 +24,8 @@ def test_the_program_prints_and_writes_the_same(tmp_path):
     assert written["return"]["mean"] == report.returns.mean and written["preset"] == report.preset == "refined"
     assert written["episodes"][1]["total"] == report.episodes[1].total
     assert written["score"] == report.score and report.returns.episodes == 2
+    zero, demonstrator, _ = written["anchors"].values()
+    assert report.score == pytest.approx((report.returns.mean - zero) / (demonstrator - zero))
 
 
 def test_policies_of_any_kind():

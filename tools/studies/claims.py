@@ -48,7 +48,7 @@ def _initial_return(result: RunResult) -> float:
 
 def _lead_over_demonstrator(robot: str, metric_of: _MetricOf) -> float:
     """Return the least lead of the online algorithms over the paper's demonstrator."""
-    return np.min([metric_of(robot, name) for name in ONLINE]) - evaluation.expert_return(Setup.of(robot))
+    return np.min([metric_of(robot, name) for name in ONLINE]) - evaluation.paper_return(Setup.of(robot))
 
 
 def _lead_by_prior_data(robot: str, metric_of: _MetricOf) -> float:

@@ -206,7 +206,7 @@ def check_same_run(path: str | os.PathLike[str], config: Mapping[str, Any], left
         ValueError: the folder is of another run, or of none.
     """
     plain_config = json.loads(json.dumps(config))  # as a file has it: lists for tuples
-    for name, folder_value, value in _differences(read_config(path), plain_config):
+    for name, folder_value, value in checks.differences(read_config(path), plain_config):
         if name == LEG_VIEWS:
             raise ValueError(
                 f"{path}: of another version, whose legs saw some blocks as the body has them; write to another folder"
@@ -323,17 +323,6 @@ def _write_config(path: Path, config: Mapping[str, Any], growing: Sequence[str])
             return
     with files.writing_json(path / CONFIG) as file:  # maybe over that of a run that was refused
         file.update(config)
-
-
-def _differences(folder_config: Mapping, config: Mapping, prefix: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Yield name, value in the folder and other value of fields that differ; names of nested fields have dots."""
-    for field in dict.fromkeys((*config, *folder_config)):
-        folder_value = folder_config.get(field)
-        value = config.get(field)
-        if isinstance(folder_value, dict) and isinstance(value, dict):
-            yield from _differences(folder_value, value, f"{prefix}{field}.")
-        elif folder_value != value:
-            yield f"{prefix}{field}", folder_value, value
 
 
 def _read_checkpoint(path: Path, with_arrays: bool = True) -> tuple[dict[str, np.ndarray] | None, dict[str, Any]]:

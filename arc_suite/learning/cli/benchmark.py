@@ -104,18 +104,14 @@ def score_policies(division: str) -> None:
     name = FLAGS.name or folder.resolve().name
     benchmark.check_name(name)
     files.check_folder(FLAGS.results)
-    judged = entries.score_policies(folder, announce)
+    count = len(entries.find_policies(folder))
+    size = SEEDS * len(PLACES)
+    say(f"{folder}: {count} of the {size} policies of an entry, {evaluation.EPISODES} episodes each")
+    judged = entries.score_policies(folder, progress)
     studies = Path(FLAGS.results)
     lines_by_run = {entries.run_name(policy.score): policy.lines for policy in judged}
     publication.write_finals(studies / f"{division}-{name}", lines_by_run)
     benchmark.write(studies, division, name, [policy.score for policy in judged])
-
-
-def announce(policies, desc: str, **options):
-    """Print how many policies are judged, as that takes minutes, and return their progress bar."""
-    size = SEEDS * len(PLACES)
-    say(f"{desc}: {len(policies)} of the {size} policies of an entry, {evaluation.EPISODES} episodes each")
-    return progress(policies, desc=desc, **options)
 
 
 def _is_selected(run: tables.Run, places: list[str]) -> bool:

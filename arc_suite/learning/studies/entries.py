@@ -43,7 +43,7 @@ class Judged(NamedTuple):
     lines: finals.Lines
 
 
-def score_policies(folder: Path, progress: Callable) -> list[Judged]:
+def score_policies(folder: Path, progress: Callable[..., Any]) -> list[Judged]:
     """Play the episodes that judge the policies of a folder, and return their scores and lines.
 
     An entry of the folder is a policy if it has an ending of `ENDINGS` or a name of `NAMES`, or is the folder of a
@@ -58,16 +58,23 @@ def score_policies(folder: Path, progress: Callable) -> list[Judged]:
         ValueError: no policy in the folder, another name, two policies of a place and seed, or one that does not fit.
         OSError: a file cannot be read.
     """
-    paths_by_run = _find_policies(folder)
+    paths_by_run = find_policies(folder)
     with contextlib.ExitStack() as stack:
         has_module = any(path.suffix == named.PYTHON_EXTENSION for path in paths_by_run.values())
         frozen_folder = stack.enter_context(frozen.freeze(folder)) if has_module else None
-        bar = progress(paths_by_run.items(), desc=str(folder), unit="policy", leave=False)
-        return [_judge_policy(path, place_setup(*place), seed, frozen_folder) for (*place, seed), path in bar]
+        return [
+            _judge_policy(path, place_setup(*place), seed, frozen_folder, progress)
+            for (*place, seed), path in paths_by_run.items()
+        ]
 
 
-def _find_policies(folder: Path) -> dict[tuple[str, str, int], Path]:
-    """Return the paths of the policies in a folder by robot, task and seed, in the order of their names."""
+def find_policies(folder: Path) -> dict[tuple[str, str, int], Path]:
+    """Return the paths of the policies in a folder by robot, task and seed, in the order of their names.
+
+    Raises:
+        ValueError: no policy in the folder, another name, or two policies of a place and seed.
+        OSError: the folder cannot be read.
+    """
     paths_by_run: dict[tuple[str, str, int], Path] = {}
     with files.reading(folder):
         paths = sorted(filter(_is_policy, folder.iterdir()))
@@ -90,7 +97,9 @@ def _is_policy(path: Path) -> bool:
     return not is_skipped and (path.suffix in ENDINGS or path.name in NAMES or policies.is_file(os.fspath(path)))
 
 
-def _judge_policy(path: Path, setup: Setup, seed: int, frozen_folder: Frozen | None) -> Judged:
+def _judge_policy(
+    path: Path, setup: Setup, seed: int, frozen_folder: Frozen | None, progress: Callable[..., Any]
+) -> Judged:
     """Play the episodes that judge a policy, and return its score and their lines.
 
     Args:
@@ -98,6 +107,7 @@ def _judge_policy(path: Path, setup: Setup, seed: int, frozen_folder: Frozen | N
         setup: setup of its place.
         seed: seed of its training.
         frozen_folder: copy of its folder, which a module needs.
+        progress: makes a progress bar as `tqdm` does.
     """
     is_module = path.suffix == named.PYTHON_EXTENSION
     sha256 = hash_module(frozen_folder, path.name) if is_module else policies.digest(str(path))
@@ -108,7 +118,7 @@ def _judge_policy(path: Path, setup: Setup, seed: int, frozen_folder: Frozen | N
     environments = setup.make_vec(len(seeds), autoreset_mode=AutoresetMode.DISABLED)
     acting = _acting(path, setup, len(seeds), frozen_folder)
     with contextlib.closing(environments), acting as policy:
-        episodes = evaluation.episodes_in_batch(environments, policy, seeds)
+        episodes = finals.play_batch(environments, policy, seeds, progress, f"judging {path}")
     with contextlib.closing(setup.load()) as environment, _acting(path, setup, 1, frozen_folder) as policy:
         style_seeds = seeds[: evaluation.CURVE_EPISODES]
         episode_metrics = [

@@ -259,11 +259,11 @@ def _anchor_lines_of(result: RunResult, episodes: str, demonstrators) -> list[tu
     """
     levels = _shown_levels(result, demonstrators)
     scale = results.anchors_of(result, result.seeds, demonstrators)
-    expert_return = evaluation.expert_return(result.run.configuration.setup)
+    paper_return = evaluation.paper_return(result.run.configuration.setup)
     lines = []
     for name, level in levels.items():
         is_anchor = name in (anchors.ZERO, scale.preset)
-        is_paper_expert = name == "medium" and expert_return
+        is_of_paper = name == "medium" and paper_return
         cells = (
             result.run.place,
             _policy_label(name),
@@ -273,7 +273,7 @@ def _anchor_lines_of(result: RunResult, episodes: str, demonstrators) -> list[tu
             "-",
             "-",
             _format_score(scale.score(level.mean)),
-            f"{expert_return:.0f}" if is_paper_expert else "-",
+            f"{paper_return:.0f}" if is_of_paper else "-",
             f"anchor {episodes}" if is_anchor else f"{level.seeds} episodes",
         )
         lines.append(cells)
