@@ -105,7 +105,7 @@ TESTS = {
     "After a kill at any moment, an earlier dataset still opens, and the same command makes the same episodes.": [
         f"{STORAGE}::test_killed_at_any_change_of_files_the_dataset_opens_and_the_same_command_completes_it"
     ],
-    "Every episode carries its sha256, checked at each reading.": [
+    "Every episode carries its sha256, which `arc_suite.data.open` checks at each reading.": [
         "data/test_verification.py::test_a_bit_that_changed_is_found"
     ],
     "`arc-suite collect --verify ID` replays a dataset from its seeds and checks that it is bit-identical.": [
