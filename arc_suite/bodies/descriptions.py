@@ -25,7 +25,8 @@ class Description(NamedTuple):
     Attributes:
         legs: (..., 12, 41) foot and mount from the torso's origin (6), direction of the foot (2), number of joints as
             one of four (4), Jacobian of the sole (3 x 4), joint ranges, rad (4 x 2), stiffness, action per rad, and
-            damping of position control (4 + 4), duty factor.
+            damping of position control (4 + 4), duty factor. Gains are those at an `agility` of 1, as position control
+            exerts the same torques with stronger motors.
         torso: (..., 10) number of legs by 12, half-extents of the first solid (3), center of mass (3), static
             stability margin, R, duty factor.
         mask: (..., 12, 4) whether a leg has a joint.
@@ -92,8 +93,8 @@ def _describe_legs(body: Body, pose: PoseMechanics, ranges: np.ndarray, duty_fac
         joint_counts,
         jacobians.swapaxes(1, 2) / pose.height,
         pad_joints(body, ranges)[:leg_count],
-        pad_joints(body, stiffness)[:leg_count],
-        pad_joints(body, damping * rate)[:leg_count],
+        pad_joints(body, body.agility * stiffness)[:leg_count],
+        pad_joints(body, body.agility * damping * rate)[:leg_count],
         np.full((leg_count, 1), duty_factor),
     ]
     return np.concatenate([part.reshape(leg_count, -1) for part in parts], axis=-1)

@@ -47,7 +47,15 @@ def test_those_of_any_body_earn_what_is_listed(task):
     assert np.mean(returns) == pytest.approx(INDEX[f"universal-{task}"]["return"], rel=0.01)
 
 
-@pytest.mark.parametrize("body", [generator.generate(8, 3), generator.random_body(200_003)], ids=lambda body: body.name)
+BODIES = [
+    generator.generate(8, 3),
+    generator.random_body(200_003),
+    generator.generate(5, 3).replace(name="strong", agility=3.0),
+    generator.generate(5, 3).replace(name="weak", agility=0.5),
+]
+
+
+@pytest.mark.parametrize("body", BODIES, ids=lambda body: body.name)
 @pytest.mark.parametrize("task", ["walk", "steer"])
 def test_any_body_walks_by_it(body, task):
     """Bodies that it was not trained with."""
