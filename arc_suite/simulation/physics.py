@@ -221,9 +221,16 @@ class Physics(dm_mujoco.Physics):
             forks.refuse("environment")
 
     def render(
-        self, height: int = 480, width: int = 640, camera_id: int | str = "tracking", **kwargs: Any
+        self,
+        height: int = 480,
+        width: int = 640,
+        camera_id: int | str | mujoco.MjvCamera = "tracking",
+        **kwargs: Any,
     ) -> np.ndarray:
         """Draw the decorated body in its present pose; other arguments as in dm_control.
+
+        `camera_id` is a camera's name or index, -1 for a free one, or a `mujoco.MjvCamera` that the caller places. The
+        decorated model has cameras of its own: `model.cam_pos` and other fields of cameras have no effect.
 
         With `quality="film"` edges of shadows are finer; with "still" all edges are. The default is "fast". Through the
         camera `eye` it is "sense", without shadows, ornaments and markers.

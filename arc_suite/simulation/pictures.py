@@ -2,12 +2,13 @@
 
 import functools
 from collections.abc import Iterable, Sequence
+from numbers import Integral
 from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 from dm_control import mujoco as dm_mujoco
-from dm_control.mujoco import wrapper
+from dm_control.mujoco import engine, wrapper
 
 from arc_suite import checks, models, rotations
 from arc_suite.arenas import FLAT, Arena
@@ -52,6 +53,17 @@ MAX_SCALE = 2  # of the largest picture
 # Of pictures of environments; width and height in pixels.
 _DEFAULT_OPTIONS: dict[str, Any] = {"width": 640, "height": 480, "camera_id": "tracking"}
 _FAILED_LEG_COLOR = (0.07, 0.07, 0.08, 1.0)
+_FIELDS_OF_CAMERA = ("type", "fixedcamid", "trackbodyid", "distance", "azimuth", "elevation", "orthographic")
+
+
+class _PlacedCamera(engine.Camera):
+    """A camera of dm_control where a caller's `MjvCamera` is."""
+
+    def __init__(self, physics, height, width, placed: mujoco.MjvCamera, scene_callback=None):
+        super().__init__(physics, height, width, camera_id=-1, scene_callback=scene_callback)
+        for name in _FIELDS_OF_CAMERA:  # copied, as MuJoCo moves a camera that tracks a part
+            setattr(self._render_camera, name, getattr(placed, name))
+        self._render_camera.lookat[:] = placed.lookat
 
 
 class _SwingingGeom(NamedTuple):
@@ -181,7 +193,13 @@ class Decorated(dm_mujoco.Physics):
             if callback_of_caller is not None:
                 callback_of_caller(physics, scene)
 
-        return super().render(height, width, camera_id, scene_callback=callback, **kwargs)
+        if not isinstance(camera_id, mujoco.MjvCamera):
+            return super().render(height, width, camera_id, scene_callback=callback, **kwargs)
+        camera = _PlacedCamera(self, height, width, camera_id, scene_callback=callback)
+        try:
+            return camera.render(**kwargs)
+        finally:
+            camera.scene.free()
 
     @property
     def contexts(self):
@@ -230,7 +248,7 @@ def picture(
     qpos: np.ndarray,
     height: int,
     width: int,
-    camera_id: int | str,
+    camera_id: int | str | mujoco.MjvCamera,
     share: float | None = None,
     mocap_pos: np.ndarray | None = None,
     markers: Iterable[Marker] = (),
@@ -247,7 +265,7 @@ def picture(
         qpos: (nq,) its positions.
         height: pixels.
         width: pixels.
-        camera_id: a camera's name or index, -1 for a free one.
+        camera_id: a camera's name or index, -1 for a free one, or a placed camera, which does not change.
         share: share of the greatest reward, 0 to 1, shown as the color of the material `glow`; None keeps its own.
         mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
         markers: debug markers; pictures of depth or segments show none.
@@ -267,7 +285,7 @@ def picture(
     """
     check_size(height, width)
     if quality is None:
-        quality = "sense" if camera_id == EYE else "fast"
+        quality = "sense" if isinstance(camera_id, str) and camera_id == EYE else "fast"
     if quality == "sense":
         share = None
         markers = ()
@@ -280,7 +298,10 @@ def picture(
 
     def draw():
         decorated = _decorated_body(body, arena, drawn_quality)
-        check_camera(decorated.model.ptr, camera_id)
+        if isinstance(camera_id, mujoco.MjvCamera):
+            check_placed_camera(decorated.model.ptr, camera_id)
+        else:
+            check_camera(decorated.model.ptr, camera_id)
         decorated.pose(qpos, share, mocap_pos, markers, failed_legs, swings)
         return decorated.render(scale * height, scale * width, camera_id, **kwargs)
 
@@ -353,5 +374,26 @@ def check_camera(model: mujoco.MjModel, camera_id: int | str) -> None:
     cameras = [model.camera(index).name for index in range(model.ncam)]
     if isinstance(camera_id, str):
         checks.name(camera_id, cameras, "camera")
-    elif camera_id not in range(-1, len(cameras)):
-        raise ValueError(f"no camera {camera_id}: expected -1 (free) to {len(cameras) - 1}, or one of {cameras}")
+    elif isinstance(camera_id, mujoco.MjvCamera):
+        raise ValueError(f"camera_id: expected one of {cameras}; an MjvCamera is for physics.render")
+    elif not isinstance(camera_id, Integral) or camera_id not in range(-1, len(cameras)):
+        raise ValueError(
+            f"no camera {checks.preview(camera_id)}: expected -1 (free) to {len(cameras) - 1}, or one of {cameras}"
+        )
+
+
+def check_placed_camera(model: mujoco.MjModel, camera: mujoco.MjvCamera) -> None:
+    """Check that a placed camera is free, or belongs to a part or camera of a model.
+
+    Raises:
+        ValueError: it does not.
+    """
+    kinds = mujoco.mjtCamera
+    if camera.type == kinds.mjCAMERA_TRACKING:
+        checks.integer("trackbodyid of the camera", camera.trackbodyid, 0, model.nbody - 1)
+    elif camera.type == kinds.mjCAMERA_FIXED:
+        checks.integer("fixedcamid of the camera", camera.fixedcamid, 0, model.ncam - 1)
+    elif camera.type != kinds.mjCAMERA_FREE:
+        raise ValueError(
+            f"type of the camera: expected mjCAMERA_FREE, mjCAMERA_TRACKING or mjCAMERA_FIXED, got {camera.type}"
+        )

@@ -6,6 +6,7 @@ import pickle
 
 import dm_env
 import gymnasium
+import mujoco
 import numpy as np
 import pytest
 from refusals import refused
@@ -31,6 +32,8 @@ PRESETS = (
     "sighted, leaping, planned, tracked, rising, crossing)"
 )
 CAMERAS, NAMED = "['tracking', 'portrait', 'profile', 'eye']", "(there are: tracking, portrait, profile, eye)"
+PLACED_CAMERA = mujoco.MjvCamera()
+PLACED = f"camera_id: expected one of {CAMERAS}; an MjvCamera is for physics.render"
 BLOCKS = "observation: expected blocks posture and velocities by name, as `split` of a task gives them"
 GAITS = "(there are: trot, pace, bound, walk, tripod, tetrapod, ripple, wave)"
 SEED = "seed: expected an integer from 0 to 4294967295, got"
@@ -198,6 +201,9 @@ CASES = [
     # Cameras and sizes.
     (render(24, 32, -2), f"no camera -2: expected -1 (free) to 3, or one of {CAMERAS}"),
     (render(24, 32, 1.5), f"no camera 1.5: expected -1 (free) to 3, or one of {CAMERAS}"),
+    (render(24, 32, np.zeros(2)), f"no camera array([0., 0.]): expected -1 (free) to 3, or one of {CAMERAS}"),
+    (make(**PICTURE, camera_id=PLACED_CAMERA), PLACED),
+    (envs(**PICTURE, camera_id=PLACED_CAMERA), PLACED),
     (make(**PICTURE, camera_id="prtrait"), f"unknown camera 'prtrait'; did you mean 'portrait'? {NAMED}"),
     (envs(**PICTURE, camera_id=9), f"no camera 9: expected -1 (free) to 3, or one of {CAMERAS}"),
     (render(0, 32), "height: expected an integer from 1 to 2160, got 0"),

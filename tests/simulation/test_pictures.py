@@ -1,6 +1,7 @@
 """Pictures of states: drawn without a simulation, and the same as of one."""
 
 import imports
+import mujoco
 import numpy as np
 import pytest
 from fixtures.obstacles import Obstacle
@@ -107,6 +108,43 @@ def test_cameras_are_checked_on_a_model():
         check_camera(model, camera)
     with pytest.raises(ValueError, match=r"^no camera 4: "):
         picture(BODY, FLAT, model.qpos0, 60, 80, 4)
+
+
+def test_a_placed_camera_shows_the_decorated_body_and_does_not_move():
+    """A user's `MjvCamera` is drawn as dm_control draws the free camera, and as the model's own by their numbers."""
+    physics = Physics.from_body(BODY, ARENAS["bumps"](BODY))
+    physics.forward()
+    free = mujoco.MjvCamera()
+    mujoco.mjv_defaultFreeCamera(Decorated.from_body(BODY, physics.arena).model.ptr, free)
+    assert_array_equal(physics.render(60, 80, free), physics.render(60, 80, -1))
+    free.lookat, free.distance, free.azimuth, free.elevation = (0.0, 0.0, 0.5), 3.0, 120.0, -20.0
+    placed = physics.render(60, 80, free)
+    assert_array_equal(physics.render(60, 80, free), placed)
+    assert (placed != physics.render(60, 80, -1)).any(axis=-1).mean() > 0.3
+    assert (physics.render(60, 80, free, depth=True) < 5.0).mean() > 0.1
+    tracking = mujoco.MjvCamera()
+    tracking.type, tracking.trackbodyid = mujoco.mjtCamera.mjCAMERA_TRACKING, physics.model.body("torso").id
+    physics.render(60, 80, tracking)
+    assert_array_equal(tracking.lookat, np.zeros(3))
+    fixed = mujoco.MjvCamera()
+    fixed.type, fixed.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, physics.model.camera("profile").id
+    assert_array_equal(physics.render(60, 80, fixed), physics.render(60, 80, "profile"))
+
+
+@pytest.mark.parametrize(
+    ("kind", "field", "message"),
+    [
+        ("TRACKING", "trackbodyid", "trackbodyid of the camera: expected an integer from 0 to 25, got 99"),
+        ("FIXED", "fixedcamid", "fixedcamid of the camera: expected an integer from 0 to 3, got 99"),
+        ("USER", "distance", "type of the camera: expected mjCAMERA_FREE, mjCAMERA_TRACKING or mjCAMERA_FIXED, got 3"),
+    ],
+)
+def test_placed_cameras_of_no_part_or_kind_are_refused(kind, field, message):
+    camera = mujoco.MjvCamera()
+    camera.type = getattr(mujoco.mjtCamera, f"mjCAMERA_{kind}")
+    setattr(camera, field, 99)
+    with pytest.raises(ValueError, match=f"^{message}$"):
+        Physics.from_body(BODY).render(60, 80, camera)
 
 
 @pytest.mark.parametrize(

@@ -56,7 +56,12 @@ define_walk(more=", or all of them side by side")
 flags.DEFINE_integer(
     "seed", 0, "Seed of the start of the episode and of the random policy.", lower_bound=0, upper_bound=2**32 - 1
 )
-flags.DEFINE_string("camera", None, f"{', '.join(CAMERAS)}. [default: profile, of several robots portrait]")
+flags.DEFINE_string(
+    "camera",
+    None,
+    "tracking (side, from afar), portrait (front and side), profile (side, a little from the front) or eye (what is "
+    "ahead of the torso). [default: profile, of several robots portrait]",
+)
 flags.DEFINE_integer(
     "width",
     None,
