@@ -28,6 +28,9 @@ TESTS = {
     "`MUJOCO_GL` becomes `egl` if it is unset, there is no display, and libEGL loads.": [
         f"{OPENGL}::test_egl_where_no_display_answers_and_what_is_missing"
     ],
+    "Renderers of dm_control and MuJoCo read it at their import: import arc_suite before them, or export it.": [
+        f"{OPENGL}::test_renderers_of_others_work_where_this_import_comes_first"
+    ],
     "The first picture opens one OpenGL context for the process, in a thread of its own.": [
         f"{OPENGL}::test_import_opens_nothing",
         f"{OPENGL}::test_a_further_rendering_environment_costs_little",

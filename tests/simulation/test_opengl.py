@@ -94,6 +94,23 @@ def test_egl_where_no_display_answers_and_what_is_missing(tmp_path, sitecustomiz
     assert lines == [f"changed {changed} removed []", "reward True", outcome, outcome, "reward True"]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("order", "variables"),
+    [(("arc_suite", "mujoco, dm_control.suite"), {}), (("dm_control.suite, mujoco", "arc_suite"), EGL)],
+)
+def test_renderers_of_others_work_where_this_import_comes_first(order, variables):
+    code = f"""
+import {order[0]}
+import {order[1]}
+print(dm_control.suite.load("cartpole", "swingup").physics.render(24, 32).shape)
+model = mujoco.MjModel.from_xml_string("<mujoco/>")
+with mujoco.Renderer(model, 24, 32) as renderer:
+    print(renderer.render().shape)
+"""
+    assert interpreters.printed(code, **UNSET | variables) == ["(24, 32, 3)"] * 2
+
+
 @pytest.mark.parametrize(
     "error",
     [
