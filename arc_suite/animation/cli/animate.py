@@ -21,7 +21,7 @@ import math
 from absl import flags
 
 from arc_suite.animation import clips as catalog
-from arc_suite.animation.clips import clip_files, swaying
+from arc_suite.animation.clips import clip_files, metadata, swaying
 from arc_suite.cli.flags import define_walk, only_setup, policy_name, preset_from_flags
 from arc_suite.cli.program import progress
 
@@ -40,7 +40,7 @@ flags.DEFINE_string("rig", "skin", f"{' or '.join(catalog.RIGS)}: bones and one 
 flags.DEFINE_string(
     "root_motion", "both", "moving: the root goes as the body walks; in_place: it stays; both: each clip twice."
 )
-flags.DEFINE_bool("straight", False, "Loops that do not turn go exactly where they are to, and do not veer.")
+flags.DEFINE_bool("straight", False, "Loops that do not turn, starts and stops go where they are to, and do not veer.")
 flags.DEFINE_bool("plant", False, "Feet in stance stay where they are, by inverse kinematics, and do not slide.")
 flags.DEFINE_string(
     "weight",
@@ -94,6 +94,8 @@ def main() -> None:
     )
     if FLAGS.output.lower().endswith(clip_files.GLB_EXTENSION):
         print_table(clips)
+        for line in filter(None, map(metadata.describe_odd_steps, clips)):
+            print(line)
     metrics = clip_files.metrics_file(FLAGS.output)
     print(f"wrote {FLAGS.output}" if metrics is None else f"wrote {FLAGS.output} and {metrics}")
 

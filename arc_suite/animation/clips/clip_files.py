@@ -100,15 +100,17 @@ def animate(
             names = catalog.clip_names()
         catalog_names = [name for name in names if not _is_motion(name)]
         made_clips = [_read_clip(setup.body, name, fps) for name in names if _is_motion(name)]
+        left_out: dict[str, str] = {}
         if catalog_names or not names:
             made_clips += make_clips(
-                setup, catalog_names, policy, preset, fps, recording_progress, straight, plant, weight
+                setup, catalog_names, policy, preset, fps, recording_progress, straight, plant, weight, left_out
             )
         _check_names(made_clips)
         if extension == GLB_EXTENSION:
-            metrics |= _write_glb(temporary, setup.body, made_clips, **options)
+            clip_options = {"weight": weight, "straight": straight, "plant": plant}
+            metrics |= _write_glb(temporary, setup.body, made_clips, clip_options, left_out, **options)
         elif extension == SHEET_EXTENSION:
-            metrics |= _write_sheet(temporary, path.name, setup.body, made_clips, **options)
+            metrics |= _write_sheet(temporary, path.name, setup.body, made_clips, left_out, **options)
         else:
             _write_motion_or_film(temporary, extension, setup.body, made_clips[0], progress, **options)
     return made_clips
@@ -181,6 +183,8 @@ def _write_glb(
     path: Path,
     body: Body,
     clips: Sequence[Clip],
+    clip_options: Mapping[str, Any],
+    left_out: Mapping[str, str],
     rig: str = "skin",
     root_motion: str = "both",
     triangles: int | None = None,
@@ -190,7 +194,7 @@ def _write_glb(
     """Write a glTF file and return its metrics."""
     generator = f"arc_suite {versions.version_of('arc_suite')}"
     path.write_bytes(glb(body, clips, rig, root_motion, generator, triangles, uv, reduce))
-    return sidecar(body, clips, root_motion)
+    return sidecar(body, clips, root_motion, clip_options, left_out)
 
 
 def _write_film(
@@ -215,6 +219,7 @@ def _write_sheet(
     name: str,
     body: Body,
     clips: Sequence[Clip],
+    left_out: Mapping[str, str],
     size: int = DEFAULT_SIZE,
     transparent: bool = False,
     directions: int = DEFAULT_DIRECTIONS,
@@ -228,4 +233,4 @@ def _write_sheet(
         raise ValueError(f"the sheet is {height} pixels high, more than {_MAX_SHEET_SIZE}; lower size or directions")
     sheet = filming.sprite_sheet(body, clips, size, directions, transparent)
     films.write_png(path, [sheet.picture], 0.0)
-    return sprites.describe_sheet(name, clips, sheet)
+    return sprites.describe_sheet(name, clips, sheet, left_out)

@@ -1,7 +1,7 @@
 """Animation clips: named motions of one body, which loop, stay in step and connect."""
 
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, MutableMapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -74,6 +74,7 @@ def clips(
     straight: bool = False,
     plant: bool = False,
     weight: float | str = 1.0,
+    left_out: MutableMapping[str, str] | None = None,
 ) -> list[Clip]:
     """Make clips of a body, all of them by one policy, except the showcases of presets.
 
@@ -96,10 +97,11 @@ def clips(
             for the one that suits the task and the body.
         fps: frames a second.
         progress: wraps the recordings, such as `tqdm`.
-        straight: whether loops that do not turn go exactly where their commands say; without it, they veer as the body
-            does.
+        straight: whether loops that do not turn, starts and stops go exactly where their commands say; without it, they
+            veer as the body does.
         plant: whether inverse kinematics keeps feet in stance where they are; without it, they slide as in the physics.
         weight: multiple of the usual weight, from 0 for none to 2; or one of `swaying.CHARACTERS`.
+        left_out: takes the reasons why clips cannot be made, by name.
 
     Raises:
         ValueError: no name, an unknown one, a value out of range, a policy that does not fit, or no clip that can be
@@ -112,14 +114,16 @@ def clips(
     character = swaying.choose_character(weight)
     names = _check_names(names)
     recorder = Recorder(setup, policy, _choose_preset(setup, policy) if preset is None else preset)
-    left_out: dict[str, str] = {}
-    drafts = make_drafts(recorder, names, progress, left_out, straight, plant, character)
-    _report_left_out(setup.body, names, left_out)
+    reasons: dict[str, str] = {}  # why clips cannot be made, by name
+    drafts = make_drafts(recorder, names, progress, reasons, straight, plant, character)
+    _report_left_out(setup.body, names, reasons)
+    if left_out is not None:
+        left_out |= {name: reasons[name] for name in names if name in reasons}
     body = setup.body
     sampled_names = drafts.keys() & {*names, "walk"}  # starts and stops swing as the walk, even if it is not asked for
     samples = {name: sample_clip(name, body, drafts[name], fps) for name in sampled_names}
     walk = samples["walk"].motion if "walk" in samples else None
-    named_clips = {name: samples[name] for name in names if name not in left_out}
+    named_clips = {name: samples[name] for name in names if name not in reasons}
     for name, clip in named_clips.items():
         swings = secondary.swing(body, catalog.clip_of(name), clip.motion, walk)
         named_clips[name] = clip._replace(swings=swings)

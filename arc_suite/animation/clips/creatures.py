@@ -326,7 +326,8 @@ def _add_animations(
     body_tracks = _add_body_tracks(tracks, clip, parts, nodes)
     for name, root_moves in name_animations(clip, roots_move).items():
         root_tracks = _add_root_tracks(tracks, clip, nodes.root, root_moves)
-        document.add("animations", _animation(name, clip, [*root_tracks, *body_tracks]))
+        metadata = clip_metadata(clip, root_moves)
+        document.add("animations", _animation(name, metadata, [*root_tracks, *body_tracks]))
 
 
 def _add_body_tracks(tracks: _ClipTracks, clip: Clip, parts: Sequence[Part], nodes: _Nodes) -> list[_Track]:
@@ -369,13 +370,13 @@ def _root_path(ground_poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return positions, orientations
 
 
-def _animation(name: str, clip: Clip, tracks: Sequence[_Track]) -> dict[str, Any]:
+def _animation(name: str, metadata: dict[str, Any], tracks: Sequence[_Track]) -> dict[str, Any]:
     channels = []
     samplers = []
     for index, track in enumerate(tracks):
         channels.append({"sampler": index, "target": {"node": track.node, "path": track.path}})
         samplers.append({"input": track.times, "output": track.values})
-    return {"channels": channels, "name": name, "samplers": samplers, "extras": clip_metadata(clip)}
+    return {"channels": channels, "name": name, "samplers": samplers, "extras": metadata}
 
 
 def _to_gltf_rotation(quaternions: np.ndarray) -> np.ndarray:

@@ -61,7 +61,7 @@ def make_drafts(
         names: see `catalog.clip_of`, without modules.
         progress: wraps the recordings.
         left_out: takes the reasons why clips cannot be made, by name.
-        straight: whether loops that do not turn go exactly where their commands say.
+        straight: whether loops that do not turn, starts and stops go exactly where their commands say.
         plant: whether feet in stance do not slide.
         character: how the body carries its weight.
     """
@@ -83,7 +83,7 @@ def make_drafts(
     walk = unplanted_drafts["walk"] if "walk" in drafts else None
     planted_walk = drafts.get("walk") if plant else None
     if transition is not None:
-        drafts |= make_clips_from_rest(recorder, transition, names, walk, planted_walk, left_out)
+        drafts |= make_clips_from_rest(recorder, transition, names, walk, planted_walk, left_out, straight)
         drafts = _keep_within_bounds(body, drafts, left_out)
     drafts = weight.add_weight(body, drafts, character)
     for name in names:

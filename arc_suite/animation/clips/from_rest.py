@@ -28,6 +28,7 @@ def make_clips_from_rest(
     walk: Draft | None,
     planted_walk: Draft | None,
     left_out,
+    straight: bool = False,
 ) -> dict[str, Draft]:
     """Return the draft of idle, and those of the named clips that connect to it.
 
@@ -38,6 +39,7 @@ def make_clips_from_rest(
         walk: clip that stops and starts connect to, with feet as in the physics.
         planted_walk: the same with planted feet; None if feet are not to be planted.
         left_out: takes the reasons why clips cannot be made.
+        straight: whether stops and starts go exactly ahead.
     """
     body = recorder.body
     rest_pose = root_motion.stay_at_start(transition.gait.recording, transition.start, samples=1).pose(0)
@@ -56,7 +58,7 @@ def make_clips_from_rest(
             case BlowClip():
                 return record_blow(recorder, clip, idle.start)
             case Passage():
-                return make_passage(body, clip, transition, idle.start, walk, planted_walk)
+                return make_passage(body, clip, transition, idle.start, walk, planted_walk, straight)
             case _:
                 return None
 

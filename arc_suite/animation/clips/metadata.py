@@ -2,7 +2,7 @@
 
 import collections
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from arc_suite.animation.clips.catalog import WalkLoop, clip_names, clip_of
@@ -37,19 +37,27 @@ _BLEND_SPACES = {
 }
 
 
-def sidecar(body: Body, clips: Sequence[Clip], root_motion: str = "both") -> dict[str, Any]:
+def sidecar(
+    body: Body,
+    clips: Sequence[Clip],
+    root_motion: str = "both",
+    options: Mapping[str, Any] | None = None,
+    left_out: Mapping[str, str] | None = None,
+) -> dict[str, Any]:
     """Return the metadata of clips by name of the animation, their blend spaces, and their bones.
 
     Args:
         body: body of the clips.
         clips: clips of one file.
         root_motion: value for the file; see `creatures.glb`.
+        options: options by which the clips were made.
+        left_out: reasons why clips cannot be made, by name.
     """
     roots_move = ROOT_MOTIONS[root_motion]
     metadata_of_animation = {}
     for clip in clips:
-        for animation in name_animations(clip, roots_move):
-            metadata_of_animation[animation] = clip_metadata(clip)
+        for animation, root_moves in name_animations(clip, roots_move).items():
+            metadata_of_animation[animation] = clip_metadata(clip, root_moves)
     return {
         "body": body.name,
         "units": {"length": "m", "time": "s", "angle": "rad"},
@@ -58,6 +66,8 @@ def sidecar(body: Body, clips: Sequence[Clip], root_motion: str = "both") -> dic
         "swinging_bones": {bone.name: _spring_metadata(bone.swing) for bone in swinging.list_bones(body)},
         "clips": metadata_of_animation,
         "blend": _make_blend_spaces(clips, roots_move),
+        "options": dict(options or {}),
+        "left_out": dict(left_out or {}),
     }
 
 
@@ -76,17 +86,17 @@ def _spring_metadata(swing: Swing) -> dict[str, float]:
     return {"frequency": round(frequency, 4), "damping": swing.damping, "limit": round(swing.limit, 4)}
 
 
-def clip_metadata(clip: Clip) -> dict[str, Any]:
-    """Return the metadata of a clip.
+def clip_metadata(clip: Clip, root_moves: bool) -> dict[str, Any]:
+    """Return the metadata of an animation of a clip, whose root moves or stays.
 
     `frames` counts the first and the last frame, and `fps` is the rate between them.
     `duty_factor` is the share of a loop in which feet touch the ground.
     `missing_steps` has the feet of a loop that touch down less often than once a cycle, and how many times less.
+    `extra_steps` has those that touch down more often, and how many times more.
     `slip` is the path of a foot in stance over the ground, m a meter of the root. `slide` is the largest diagonal of
     the way of a standing foot, m, in a clip in which feet are to stand still. `weight` is the share of the weight that
-    legs allow. `additive_to` is the animation whose
-    first frame is the reference of an additive clip. `additive_over` names the clips that it can be added to: no sole
-    then sinks deeper than 0.03 standing heights.
+    legs allow. `additive_to` is the animation whose first frame is the reference of an additive clip. `additive_over`
+    names the clips that it can be added to: no sole then sinks deeper than 0.03 standing heights.
     """
     forward_speed, left_speed, turn_rate = clip.motion.twist.tolist()  # m/s, m/s, rad/s
     contacts = []
@@ -98,6 +108,7 @@ def clip_metadata(clip: Clip) -> dict[str, Any]:
         "fps": round(1.0 / clip.motion.time_step, 6),
         "loops": clip.loops,
         "cycles": clip.cycles,
+        "root_moves": root_moves,
         "forward_speed": round(forward_speed, 6),
         "left_speed": round(left_speed, 6),
         "turn_rate": round(turn_rate, 6),
@@ -115,6 +126,7 @@ def clip_metadata(clip: Clip) -> dict[str, Any]:
         metadata["additive_over"] = list(clip.additive_over)
     elif clip.loops:
         metadata["missing_steps"] = missing_steps(clip)
+        metadata["extra_steps"] = extra_steps(clip)
         if clip.cycles:
             metadata["duty_factor"] = round(measure_duty_factor(clip), 3)
     return metadata
@@ -122,8 +134,35 @@ def clip_metadata(clip: Clip) -> dict[str, Any]:
 
 def missing_steps(clip: Clip) -> dict[str, int]:
     """Return the feet of a loop that touch down less often than once a cycle, and how many times less."""
-    touchdowns = collections.Counter(contact.foot for contact in clip.foot_contacts if contact.event == TOUCH_DOWN)
+    touchdowns = _count_touchdowns(clip)
     return {foot: clip.cycles - touchdowns[foot] for foot in clip.feet if touchdowns[foot] < clip.cycles}
+
+
+def extra_steps(clip: Clip) -> dict[str, int]:
+    """Return the feet of a loop that touch down more often than once a cycle, and how many times more."""
+    if not clip.cycles:  # without a gait feet step as they are to
+        return {}
+    touchdowns = _count_touchdowns(clip)
+    return {foot: touchdowns[foot] - clip.cycles for foot in clip.feet if touchdowns[foot] > clip.cycles}
+
+
+def describe_odd_steps(clip: Clip) -> str:
+    """Return which feet of a loop do not touch down once a cycle; "" if all do, or if a leg is to fail."""
+    kind = clip_of(clip.name) if clip.name in clip_names() else None
+    is_gait = clip.loops and clip.cycles and clip.additive_over is None
+    if not is_gait or (isinstance(kind, WalkLoop) and kind.failing is not None):
+        return ""
+    touchdowns = _count_touchdowns(clip)
+    odd_feet = [f"{foot} {touchdowns[foot]}" for foot in clip.feet if touchdowns[foot] != clip.cycles]
+    if not odd_feet:
+        return ""
+    cycles = "1 gait cycle" if clip.cycles == 1 else f"{clip.cycles} gait cycles"
+    return f"{clip.name}: touchdowns in {cycles}: {', '.join(odd_feet)}; docs/bodies.md: limits"
+
+
+def _count_touchdowns(clip: Clip) -> Mapping[str, int]:
+    """Return how often feet touch down in a clip, by name; 0 for a foot that does not."""
+    return collections.Counter(contact.foot for contact in clip.foot_contacts if contact.event == TOUCH_DOWN)
 
 
 def measure_duty_factor(clip: Clip) -> float:
@@ -170,8 +209,8 @@ def _make_blend_spaces(clips: Sequence[Clip], roots_move: Sequence[bool]) -> dic
         for clip in clips:
             command = _command_of_point(clip)
             if command is not None and command[space.zero_component] == 0.0:
-                first_animation, *_ = name_animations(clip, roots_move)
-                metadata = clip_metadata(clip)
+                first_animation, root_moves = next(iter(name_animations(clip, roots_move).items()))
+                metadata = clip_metadata(clip, root_moves)
                 points.append({"animation": first_animation, "at": [metadata[axis] for axis in space.axes]})
                 commands_to_sides.append(command[space.side_component])
         if any(commands_to_sides):

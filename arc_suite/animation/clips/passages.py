@@ -7,6 +7,7 @@ from arc_suite.animation.clips.catalog import BOTH_ENDS, Passage
 from arc_suite.animation.clips.draft import Draft
 from arc_suite.animation.clips.recorder import TransitionRecording
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose
+from arc_suite.motions.ground_poses import relative_pose, twist_to
 from arc_suite.robots.spec import Body
 
 _MAX_MEETING_SEAM = np.radians(20.0)  # rad: a stop or a start that is farther from walk or idle is left out
@@ -33,6 +34,7 @@ def make_passage(
     idle: Pose,
     walk: Draft | None,
     planted_walk: Draft | None,
+    straight: bool = False,
 ) -> Draft:
     """Return a stop or a start, which meets idle and the walk.
 
@@ -43,6 +45,7 @@ def make_passage(
         idle: first pose of idle.
         walk: with feet as in the physics.
         planted_walk: the same with planted feet; None if feet are not to be planted.
+        straight: whether the root goes exactly ahead.
 
     Raises:
         ValueError: there is no walk, or its pose is far from that of the passage.
@@ -54,10 +57,20 @@ def make_passage(
     motion = draft.motion.meet(idle, idle_end, draft.cycle_samples)
     motion = motion.meet(walk.start, walk_end, draft.cycle_samples)
     check_seam(motion, "the walk or of idle")
+    if straight:
+        motion = _straighten(motion)
     draft = draft._replace(motion=on_ground.raise_out_of_ground(body, motion, BOTH_ENDS))
     if planted_walk is None:
         return draft
     return _plant_passage(body, clip, draft, idle, walk, planted_walk)
+
+
+def _straighten(motion: ClipMotion) -> ClipMotion:
+    """Return a motion whose root goes exactly ahead, as far as it went ahead; poses in the root's frame stay."""
+    steps = relative_pose(motion.root[:-1], motion.root[1:])
+    root = np.zeros_like(motion.root)
+    root[1:, 0] = np.cumsum(steps[:, 0])
+    return motion._replace(root=root, twist=twist_to(root[-1]) / motion.seconds)
 
 
 def _plant_passage(body: Body, clip: Passage, draft: Draft, idle: Pose, walk: Draft, planted_walk: Draft) -> Draft:

@@ -1,13 +1,15 @@
 """The JSON next to a sheet of sprites, as Aseprite exports it: Phaser, PixiJS, Unity and Godot read it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from arc_suite.animation.clips.clips import Clip
 from arc_suite.animation.clips.filming import Sheet, count_frames
 
 
-def describe_sheet(image_name: str, clips: Sequence[Clip], sheet: Sheet) -> dict[str, Any]:
+def describe_sheet(
+    image_name: str, clips: Sequence[Clip], sheet: Sheet, left_out: Mapping[str, str] | None = None
+) -> dict[str, Any]:
     """Return the frames of a sheet in reading order, and the tag of each row.
 
     The name of a frame is its number. `anchor` is the point of a frame that belongs on the ground below the torso, as
@@ -18,6 +20,7 @@ def describe_sheet(image_name: str, clips: Sequence[Clip], sheet: Sheet) -> dict
         image_name: name of the picture's file.
         clips: clips that the sheet shows.
         sheet: the sheet.
+        left_out: reasons why clips cannot be made, by name.
     """
     height, width, channels = sheet.picture.shape
     size = sheet.cell_size
@@ -46,6 +49,7 @@ def describe_sheet(image_name: str, clips: Sequence[Clip], sheet: Sheet) -> dict
             "rows": rows,
             "ground_line": round(sheet.ground_line, 2),
             "pixels_per_meter": round(sheet.pixels_per_meter, 4),
+            "left_out": dict(left_out or {}),
         },
     }
 

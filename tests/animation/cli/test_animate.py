@@ -80,11 +80,15 @@ def test_a_spec_keeps_its_file_next_to_clips_of_its_name(tmp_path):
     spec = tmp_path / "spider.json"
     spec.write_text(EXAMPLES["spider"].read_text())
     before = spec.read_text()
-    done = animate("--spec=spider.json", "--clips=walk,tuned", "--output=spider.glb", cwd=tmp_path)
+    flags = ("--clips=walk,tuned", "--weight=old", "--output=spider.glb")
+    done = animate("--spec=spider.json", *flags, cwd=tmp_path)
     assert done.returncode == 0
     assert done.stderr == "arc-suite animate: spider, clip tuned is left out: spider has no preset tuned\n"
     assert spec.read_text() == before
     assert {path.name for path in tmp_path.iterdir()} == {"spider.json", "spider.glb", "spider.clips.json"}
+    figures = json.loads((tmp_path / "spider.clips.json").read_text())
+    assert figures["left_out"] == {"tuned": "spider has no preset tuned"}
+    assert figures["options"] == {"weight": "old", "straight": False, "plant": False}
 
 
 def test_a_function_refuses_what_the_program_does(tmp_path):

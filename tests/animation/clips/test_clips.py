@@ -15,7 +15,7 @@ from tiers import never, tiers
 import arc_suite
 from arc_suite import policies, rotations
 from arc_suite.animation import clips as export
-from arc_suite.animation.clips import bounds, foot_contacts, getting_up, loops, passages, recordings
+from arc_suite.animation.clips import bounds, foot_contacts, getting_up, loops, metadata, passages, recordings
 from arc_suite.animation.clips.catalog import CLIPS, WalkLoop
 from arc_suite.animation.clips.recorder import Recorder
 from arc_suite.bodies.families import sound_body
@@ -207,8 +207,10 @@ def test_names_and_hierarchy(robot):
         assert file.node(bone) in nodes[file.node("torso")]["children"]
     for animation in file.json["animations"]:
         way = gltf_reader.played(file, animation["name"], [0.0, 0.5])["root"][:, :3, 3]
-        assert (way[1] != way[0]).any() == (not animation["name"].endswith(("in_place", "in_place_loop", "idle_loop")))
-        figures = export.sidecar(body, list(made(robot).values()))["clips"][animation["name"]]
+        root_moves = not animation["name"].endswith(("in_place", "in_place_loop", "idle_loop"))
+        assert (way[1] != way[0]).any() == root_moves
+        figures = sidecar["clips"][animation["name"]]
+        assert figures["root_moves"] == root_moves
         assert animation["extras"] == figures
         assert figures["fps"] == 30.0 and figures["frames"] == round(figures["seconds"] * 30.0) + 1
 
@@ -411,6 +413,26 @@ def test_the_sidecar_has_blend_spaces_and_tells_missing_steps(robot):
     walk = made(robot)["walk"]
     lame = walk._replace(foot_contacts=tuple(e for e in walk.foot_contacts if e.foot != body.foot_names[1]))
     assert export.sidecar(body, [lame])["clips"]["walk_loop"]["missing_steps"] == {body.foot_names[1]: 1}
+    assert told["clips"]["walk_loop"]["extra_steps"] == {} and metadata.describe_odd_steps(walk) == ""
+    first = next(event for event in walk.foot_contacts if event.event == foot_contacts.TOUCH_DOWN)
+    hasty = walk._replace(foot_contacts=(*walk.foot_contacts, first))
+    assert export.sidecar(body, [hasty])["clips"]["walk_loop"]["extra_steps"] == {first.foot: 1}
+    line = f"walk: touchdowns in 1 gait cycle: {first.foot} 2; docs/bodies.md: limits"
+    assert metadata.describe_odd_steps(hasty) == line
+
+
+@pytest.mark.slow
+def test_starts_and_stops_go_straight_ahead_and_meet_their_neighbors():
+    """The root neither turns nor drifts, and comes as far."""
+    names = ("walk", "start", "stop", "idle")
+    clips = {clip.name: clip for clip in export.clips(Setup.of("tick", "steer"), names, fps=30, straight=True)}
+    for name in ("start", "stop"):
+        veering, straight = made("tick")[name].motion, clips[name].motion
+        assert veering.root[:, 1:].any() and not straight.root[:, 1:].any()
+        assert straight.root[-1, 0] == pytest.approx(veering.root[-1, 0], rel=0.05)
+    for before, after in (("walk", "stop"), ("stop", "idle"), ("idle", "start"), ("start", "walk")):
+        for one, other in zip(clips[before].motion.pose(-1), clips[after].motion.pose(0), strict=True):
+            np.testing.assert_allclose(one, other, atol=1e-6)
 
 
 @pytest.mark.long
@@ -453,8 +475,10 @@ def test_what_is_played_from_rest_begins_or_ends_with_idle():
 def test_what_is_too_far_from_the_walk_is_left_out(monkeypatch):
     monkeypatch.setattr(passages, "_MAX_MEETING_SEAM", 1e-6)
     with pytest.warns(UserWarning, match="^tick, clip stop is left out: its pose is 0 degrees from that of the walk"):
-        (walk,) = export.clips(Setup.of("tick", "steer"), ["walk", "stop"])
+        (walk,) = export.clips(Setup.of("tick", "steer"), ["walk", "stop"], left_out=(left_out := {}))
     assert walk.name == "walk"
+    assert left_out == {"stop": "its pose is 0 degrees from that of the walk or of idle, more than 0"}
+    assert export.sidecar(ROBOTS["tick"], [walk], left_out=left_out)["left_out"] == left_out
 
 
 @pytest.mark.parametrize("robot", EACH)
