@@ -4,6 +4,7 @@ _RESUME = "the same command goes on where it was interrupted"
 _DEVICE = "learners compute on the device of JAX; see docs/gpu.md"
 _WINDOW = "arc-suite view alone opens a window"
 _AMOUNT = "programs have one amount of output; 2>/dev/null hides progress and warnings"
+_CHARACTER = "arc-suite animate --weight takes a character: heavy, nervous or old"
 _FORM = "arc-suite build_model --torso, --head and --tail, with --json, writes a spec for --spec"
 CURES = {
     **dict.fromkeys(("continue", "resume"), _RESUME),
@@ -11,6 +12,7 @@ CURES = {
     **dict.fromkeys(("gui", "headless", "no_render", "nogui", "offscreen"), _WINDOW),
     **dict.fromkeys(("debug", "log_level", "quiet", "silent", "verbose", "verbosity"), _AMOUNT),
     **dict.fromkeys(("alsologtostderr", "logtostderr", "stderrthreshold"), _AMOUNT),
+    **dict.fromkeys(("character", "mood", "personality", "temperament"), _CHARACTER),
     **dict.fromkeys(("deterministic", "stochastic"), "the policy of a run acts by its mean action"),
     **dict.fromkeys(("render", "render_mode"), "arc-suite render films a policy, arc-suite view shows it"),
     **dict.fromkeys(("head", "tail", "torso"), _FORM),
@@ -22,6 +24,8 @@ CURES = {
 }
 # Those of programs that have --output.
 CURES_OF_OUTPUTS = {"format": "the extension of the output is its format"}
+# Values out of the range of a flag, which something else takes.
+CURES_OF_VALUES = {("legs", "3"): "a body of 3 legs is a spec, --spec=FILE"}
 # Flags whose values a shell changes, unless they are quoted.
 CURES_OF_MISSING_VALUES = {"palette": "a shell drops what follows a #: quote the colors, --palette='#3a5f2b'"}
 
@@ -45,6 +49,7 @@ CURES_OF_PROGRAMS = {
         "frames": "a clip lasts a whole cycle; --fps sets its pictures",
         "loop": "clips of a gait are loops",
         "scale": _LENGTHS,
+        "style": "did you mean --weight? it takes a character: heavy, nervous or old",
     },
     "benchmark": {
         **dict.fromkeys(("tensorboard", "wandb"), _TRACKERS),

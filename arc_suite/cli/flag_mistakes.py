@@ -12,7 +12,13 @@ from typing import Any, NoReturn
 from absl import flags
 
 from arc_suite import checks, policies, registry
-from arc_suite.cli.flag_cures import CURES, CURES_OF_MISSING_VALUES, CURES_OF_OUTPUTS, CURES_OF_PROGRAMS
+from arc_suite.cli.flag_cures import (
+    CURES,
+    CURES_OF_MISSING_VALUES,
+    CURES_OF_OUTPUTS,
+    CURES_OF_PROGRAMS,
+    CURES_OF_VALUES,
+)
 from arc_suite.cli.programs import NAMES_OF_FLAGS
 from arc_suite.tasks import TASKS
 
@@ -94,6 +100,8 @@ def refuse_value(error: flags.IllegalFlagValueError) -> None:
         hint = f"; did you mean --host={checks.quote(host.strip('[]'))} --port={port}?"
     elif isinstance(parser, flags.IntegerParser):
         hint = checks.hint_integer(value, parser.lower_bound, parser.upper_bound, before=f"--{name}=")
+    if (name, value) in CURES_OF_VALUES:
+        hint = f"; {CURES_OF_VALUES[name, value]}"
     raise ValueError(f"{checks.quote(flag_and_value)}: expected {expected}{hint}") from None
 
 

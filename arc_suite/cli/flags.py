@@ -61,7 +61,7 @@ def define_body(robot: str | None = "queen", more: str = "") -> None:
     flags.DEFINE_multi_string(
         "length",
         [],
-        "Factor on the length of a link: --length lower=1.5, of one leg --length l1_lower=1.5.",
+        "Factor on the length of a link: --length lower=1.5, of the leg l1 --length l1_lower=1.5.",
     )
     flags.DEFINE_string("palette", None, f"Colors of the body: {palettes.HELP}.")
 

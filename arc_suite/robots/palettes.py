@@ -50,6 +50,11 @@ def parse(text: str) -> str | int:
     colors = nearest_colors(text)
     if colors == text.lower():
         return colors
+    words = text.split(",")
+    wrong_words = [word for word in words if nearest_colors(word) is None]
+    if wrong_words and len(words) > 1:
+        wrong_word = checks.preview(wrong_words[0])
+        raise ValueError(f"palette {checks.preview(text)}: {wrong_word} is no color; expected such as {COLORS_EXAMPLE}")
     suggestions = [colors] if colors else []
     descriptions = ["a seed, such as 7", f"colors, such as {COLORS_EXAMPLE}"]
     return checks.name(text, PALETTES, "palette", suggestions, descriptions)

@@ -159,6 +159,9 @@ BOUNDS = {
     "joint_angle_noise": (0.0, TWO_PI),
     "joint_velocity_noise": (0.0, 1000.0),
 }
+# What other libraries call the height of a foot in mid-swing.
+_NAMES_OF_STEP_HEIGHT = ("clearance", "foot_clearance", "foot_height", "lift", "step_height", "swing_height")
+_STEP_HEIGHT_CURE = "no setting lifts feet, the preset surefooted does: docs/clips.md: paces"
 BOUNDS |= {shared: (0.0, min(BOUNDS[name][1] for name in names)) for shared, names in SHARED_NOISE.items()}
 
 
@@ -180,6 +183,8 @@ def values(
     """
     suggestions = ("time_limit", "random", *names_of_others, *modifiers.MODIFIERS)
     for name in overrides:
+        if name in _NAMES_OF_STEP_HEIGHT:
+            raise ValueError(f"unknown setting of {task} {checks.preview(name)}; {_STEP_HEIGHT_CURE}")
         checks.name(name, names, f"setting of {task}", suggestions=suggestions)
     published = robots.parameters(PARAMETERS["walk"], body, "walk")
     table = DEFAULTS | (fitted_parameters(body) if published is None else published)

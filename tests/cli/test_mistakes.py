@@ -179,6 +179,7 @@ LIST = "a list has commas and no spaces; see --help\n"
 RIGS = "(there are: skin, nodes)\n"
 MOTION = "expected a name, or a motion, .npz; arc-suite motion makes one of a .glb, a .bvh or a table\n"
 # What people type who come from Gymnasium, an animation program or a page of the internet.
+CHARACTER = "takes a character: heavy, nervous or old\n"
 FIRST_HOUR = {
     "evaluate --robot https://example.com/go2": f"robot 'https://example.com/go2': {DOWNLOAD}",
     "evaluate --spec=https://example.com/spider.json": "cannot read https:/example.com/spider.json: no such file or "
@@ -227,6 +228,13 @@ FIRST_HOUR = {
     "evaluate --robot=tick --task=patrol": f"unknown task 'patrol' (there are: {', '.join(TASKS)}, module:name)\n",
     "evaluate --robot=tick;queen": f"unknown robot 'tick;queen'; did you mean 'tick,queen'? {ROBOTS}",
     "animate --clips=walk+run -o a.glb": "unknown clip 'walk+run'; did you mean 'walk,run'? (there are: walk, slow, ",
+    "animate --clips=walking,idle,getup -o a.glb": "unknown clip 'walking'; did you mean 'walk'? not known either: 'ge",
+    "animate --weight=old,nervous -o a.glb": "weight: expected one name or one number, got 'old,nervous'\n",
+    "animate --temperament=old": f"unknown flag 'temperament'; arc-suite animate --weight {CHARACTER}",
+    "animate --style=old": f"unknown flag 'style'; did you mean --weight? it {CHARACTER}",
+    "animate --legs=3 -o a.glb": "flag --legs=3: expected an integer in the range [4, 12]; a body of 3 legs is a spec",
+    "animate --set step_height=0.1 -o a.glb": "unknown setting of steer 'step_height'; no setting lifts feet, the pres",
+    "build_model --legs=6 --palette=#fff,#12345g": "palette '#fff,#12345g': '#12345g' is no color; expected such as #",
     "animate --clips=note.txt -o a.glb": f"clip 'note.txt': {MOTION}",
     "animate --clips=dance.bvh -o a.glb": f"clip 'dance.bvh': {MOTION}",
     "animate --rig=bones -o a.glb": f"unknown rig 'bones'; did you mean 'skin'? {RIGS}",

@@ -153,12 +153,30 @@ def _check_names(names: Sequence[str]) -> list[str]:
     """
     if not names:
         raise ValueError(f"clips: expected one or more of {', '.join(catalog.clip_names())}, got none")
-    for name in names:
-        catalog.clip_of(name)
+    _refuse_unknown_clips(names)
     bare_names = [registry.bare_name(name) for name in names]
     if len(set(bare_names)) < len(bare_names):
         raise ValueError(f"clips: expected each once, got {', '.join(bare_names)}")
     return bare_names
+
+
+def _refuse_unknown_clips(names: Sequence[str]) -> None:
+    """Raise the ValueError of the first unknown name; its text names all others that are unknown, too."""
+    errors = {}
+    for name in names:
+        try:
+            catalog.clip_of(name)
+        except ValueError as error:
+            errors[name] = error
+    if not errors:
+        return
+    first_error, *_ = errors.values()
+    _, *other_names = map(checks.preview, errors)
+    text, parenthesis, choices = str(first_error).partition(" (there are: ")
+    if not other_names or not parenthesis:
+        raise first_error
+    separator = " " if text.endswith("?") else "; "
+    raise ValueError(f"{text}{separator}not known either: {', '.join(other_names)}{parenthesis}{choices}")
 
 
 def _report_left_out(body: Body, names: Sequence[str], left_out: Mapping[str, str]) -> None:

@@ -93,6 +93,8 @@ def choose_character(weight: float | str) -> Character:
     """
     if not isinstance(weight, str):
         return USUAL._replace(amplitude=checks.number("weight", weight, 0.0, MAX_WEIGHT))
+    if "," in weight:
+        raise ValueError(f"weight: expected one name or one number, got {checks.preview(weight)}")
     name = checks.name(weight, CHARACTERS, "weight", descriptions=(f"a number from 0 to {MAX_WEIGHT:g}",))
     return CHARACTERS[name]
 

@@ -1,7 +1,7 @@
 """Write a trained policy as ONNX, for game engines and onnxruntime.
 
 The normalizer is inside; the metadata hold the robot, the observation's blocks, the control step, the
-gears of the motors and the rule of the gait's clock.
+gears of the motors and the rule of the gait's clock. docs/engines.md says what a game needs next to it.
 
   arc-suite export runs/tick-walk-ppo-0
   arc-suite export runs/tick-walk-ppo-0 -o tick.onnx

@@ -8,7 +8,7 @@ from PIL import Image
 
 from arc_suite import animation
 from arc_suite.animation import clips as export
-from arc_suite.animation.clips import filming
+from arc_suite.animation.clips import filming, sprites
 from arc_suite.envs.setup import Setup
 from arc_suite.models.standing import measure_standing
 from arc_suite.robots import ROBOTS
@@ -37,6 +37,8 @@ def test_a_sheet_has_a_row_for_each_direction(idle):
     # Feet, and what is nearer to the camera or reaches further ahead.
     width = np.ptp(np.flatnonzero((rows[0][..., 3] > 0).any(axis=0))) / made.pixels_per_meter
     assert 1.2 < width / np.ptp(measure_standing(BODY).soles[:, 0]) < 1.8
+    left_out = {"tuned": "spider has no preset tuned"}
+    assert sprites.describe_sheet("tick.png", [idle], made, left_out)["meta"]["left_out"] == left_out
     # Seen from either side the outline is the same, mirrored.
     assert abs(rows[0][..., 3].astype(int) - rows[2][:, ::-1, 3]).mean() < 25.0
     assert abs(rows[0][..., 3].astype(int) - rows[1][..., 3]).mean() > 5.0
@@ -74,6 +76,7 @@ def test_an_importer_reads_where_cells_are(tmp_path):
     attack_columns = len(attack.times)
     assert attack_columns < columns
     assert (meta["image"], meta["rows"], meta["columns"], meta["format"]) == ("tick.PNG", 4, columns, "RGB888")
+    assert meta["left_out"] == {}
     assert meta["size"] == {"w": 32 * columns, "h": 4 * 32}
     assert [frame["filename"] for frame in frames] == [str(number) for number in range(2 * (columns + attack_columns))]
     assert frames[columns + 1]["frame"] == {"x": 32, "y": 32, "w": 32, "h": 32}
