@@ -14,7 +14,7 @@ from arc_suite.cpg.selection import LAWS, SUITE_PRESETS, law
 from arc_suite.envs.prepare import prepare_task
 from arc_suite.models.visuals import VISUALS
 from arc_suite.models.visuals.spec import Visuals
-from arc_suite.registry import ADDITIONS, BODIES_ENV, FAMILIES, MODULE_OF_NAME
+from arc_suite.registry import ADDITIONS, BODIES_ENV, FAMILIES, MODULE_OF_NAME, REFUSAL_OF_ONE_BODY
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import TASKS, Task
@@ -364,6 +364,7 @@ def register_ids() -> None:
         if env_id not in gymnasium.registry:
             gymnasium.register(
                 env_id,
+                entry_point=REFUSAL_OF_ONE_BODY,
                 vector_entry_point=BODIES_ENV,
                 kwargs={"task_name": registry.importable_name("task", task_name)},
             )

@@ -44,6 +44,7 @@ GROUND_READERS = dict.fromkeys((".png", ".obj", ".stl", ".xml"), "arc_suite.impo
 
 # The class of vector environments of different bodies, as a text for `resolve`.
 BODIES_ENV = "arc_suite.bodies:BodiesEnv"
+REFUSAL_OF_ONE_BODY = "arc_suite.bodies.environments:refuse_one_environment"
 
 # Values that other packages register, or texts `module:attribute` for `resolve`, by kind and name. The module that uses
 # a kind has a table of the suite's own values, and checks all values when it uses them; see `find`.
@@ -63,6 +64,7 @@ SETTINGS_OF_EVERY_TASK = ("time_limit", "arena", "random", "on_divergence")
 
 MAX_BODIES = 1 << 16  # the most bodies that one text may name
 
+_NAME_IN_MODULE = "module:name to import it"  # among the choices that errors list
 _SAME_WORD = 0.8  # least similarity of a misspelled name, up to 1
 _MAX_QUOTE = 80  # characters of a name in an error
 _SEED_OR_RANGE = re.compile(r"(\d{1,10})(?:-(\d{1,10}))?")  # "7" or "0-9"
@@ -278,7 +280,7 @@ def _refuse_other_words(text: str) -> None:
         raise ValueError(f"robot {checks.preview(text)}: {files.ADDRESS_CURE}")
     if text in TASKS:
         raise ValueError(f"robot {text!r}: it is a task; robots are {', '.join(ROBOTS)}")
-    _refuse_name_of_file("robot", text, (".json", *READERS))
+    _refuse_name_of_file("robot", text, (".json", *READERS), robot_words())
     if files.is_folder(text):
         extensions = ", ".join((".json", *READERS))
         hint = hint_in_folder(text)
@@ -296,11 +298,12 @@ def _refuse_gymnasium_id(kind: str, text: str) -> None:
         raise ValueError(f"{kind} {text!r}: it is an id of Gymnasium; its robot is {match[1]}, its task {match[2]}")
 
 
-def _refuse_name_of_file(kind: str, text: str, extensions: Iterable[str]) -> None:
-    """Raise ValueError for a word that is the name of a file without its extension."""
+def _refuse_name_of_file(kind: str, text: str, extensions: Iterable[str], names: Iterable[str]) -> None:
+    """Raise ValueError for a word that is the name of a file without its extension; the error lists names."""
     cure = files.suggest_extension(text, extensions)
     if cure:
-        raise ValueError(f"unknown {kind} {checks.preview(text)}{cure}")
+        choices = ", ".join([*names, _NAME_IN_MODULE])
+        raise ValueError(f"unknown {kind} {checks.preview(text)}{cure} (there are: {choices})")
 
 
 def _family_words() -> list[str]:
@@ -437,7 +440,7 @@ def arena_maker(arena: str) -> Callable[[Body], Arena]:
     if ground_text.is_text(word):
         return ground_text.fit(word)
     if isinstance(word, str) and word not in ARENAS:
-        _refuse_name_of_file("arena", word, GROUND_READERS)
+        _refuse_name_of_file("arena", word, GROUND_READERS, ARENAS)
     return _look_up(word, ARENAS, "arena")
 
 
@@ -636,7 +639,7 @@ def _look_up(name, table: Mapping, kind: str, suggestions: Iterable[str] = ()):
     if isinstance(name, str):
         _refuse_file(kind, name)
     if not (isinstance(name, str) and ":" in name):
-        return table[checks.name(name, table, kind, suggestions, ("module:name",))]
+        return table[checks.name(name, table, kind, suggestions, (_NAME_IN_MODULE,))]
 
     module, _, key = name.rpartition(":")
     if not all(part.isidentifier() for part in module.split(".")):

@@ -14,11 +14,12 @@ from arc_suite.bodies import padding, tokens
 from arc_suite.bodies.descriptions import Description, body_description
 from arc_suite.bodies.groups import Group, Member, Place, group_by_batch, scatter
 from arc_suite.bodies.tokens import Tokens
-from arc_suite.envs.base_vector import MAX_ENVS, BaseVectorEnv
+from arc_suite.envs.base_vector import MAX_ENVS, BaseVectorEnv, checked_task_kwargs
 from arc_suite.envs.calls import KnownAttributes, Lock, checked_action, checked_command, one_thread_at_a_time
 from arc_suite.envs.prepare import prepare_task, refuse_arguments
 from arc_suite.envs.setup import pair_with_tasks
 from arc_suite.robots.spec import Body
+from arc_suite.simulation.model import select_environments
 from arc_suite.tasks.contract import LEVEL, Task
 from arc_suite.tasks.readings import torso_qpos
 
@@ -137,7 +138,7 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
                 raise ValueError(f"num_envs: expected at least one for each of {count} {noun}, got {num_envs}")
         for body in different_bodies:
             padding.joint_slots(body)  # refuses too many legs or joints
-        settings = {"actions": "position", **checks.mapping("task_kwargs", task_kwargs)}
+        settings = {"actions": "position", **checked_task_kwargs(task_kwargs)}
         checks.name(settings["actions"], ["position"], "actions of different bodies")
         seed = settings.pop("random", None)
         options = {
@@ -286,14 +287,15 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
     def change_model(self, fields: Mapping[str, Any], mask=None) -> None:
         """Set fields of the models of some environments; see `VectorEnv.change_model`.
 
-        Values broadcast to the fields of each body.
+        Values broadcast to the fields of each body, or to these with a leading axis of num_envs.
         """
         self._check_open("change the model")
         mask = self._checked_mask(mask, "mask")
         checked_changes = []  # all of them, before the first model changes
         for group, indices, _ in self._places:
             if mask[indices].any():
-                checked_changes.append((group, group._checked_fields(fields), mask[indices]))
+                group_fields = select_environments(group.batch.models[0], fields, self.num_envs, indices)
+                checked_changes.append((group, group._checked_fields(group_fields), mask[indices]))
         for group, values, group_mask in checked_changes:
             group.batch.change_model(values, group_mask)
 
@@ -454,6 +456,17 @@ def _find_bodies(bodies: Any) -> list[Body]:
     """Return the bodies of one or several names, specs or ranges; see `registry.bodies_of`."""
     names = bodies if isinstance(bodies, list | tuple) else [bodies]
     return [body for name in names for body in registry.bodies_of(name)]
+
+
+def refuse_one_environment(task_name: str, **others: Any) -> None:
+    """Refuse `gymnasium.make` of an id of environments of different bodies.
+
+    Raises:
+        ValueError: always; it says what makes them, and what makes one environment.
+    """
+    bodies_id = registry.env_id("bodies", registry.task_of(task_name))
+    one = f"gymnasium.make takes a robot in place of bodies, or arc_suite.envs.gym.Env a body and {task_name!r}"
+    raise ValueError(f"{bodies_id}: gymnasium.make_vec makes these environments, with num_envs; {one}")
 
 
 def _check_same_privileged_blocks(tasks: Sequence[Task]) -> None:

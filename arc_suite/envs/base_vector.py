@@ -1,6 +1,6 @@
 """What vector environments have in common: calls of every environment, checks of seeds, masks and indices."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import gymnasium
@@ -119,3 +119,18 @@ class BaseVectorEnv(gymnasium.vector.VectorEnv[Any, np.ndarray, np.ndarray]):
                     f"indices: expected integers from 0 to {self.num_envs - 1}, got {checks.preview(index)}"
                 )
         return indices
+
+
+def checked_task_kwargs(task_kwargs: Any) -> Mapping[str, Any]:
+    """Return the settings of a vector environment, which all of its environments have at first.
+
+    Raises:
+        ValueError: no mapping.
+    """
+    is_one_for_each = isinstance(task_kwargs, list | tuple) and all(isinstance(item, Mapping) for item in task_kwargs)
+    if is_one_for_each:
+        cure = "change_settings with a mask sets those of some"
+        raise ValueError(
+            f"task_kwargs: expected one mapping for all environments, got {checks.preview(task_kwargs)}; {cure}"
+        )
+    return checks.mapping("task_kwargs", task_kwargs)

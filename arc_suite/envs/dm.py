@@ -42,6 +42,7 @@ _FLAT = "observations"  # dm_control's name of a flat observation
 _REFUSED_SETTINGS = {
     "control_timestep": "reward and observation are made for the body's own control steps",
     "n_sub_steps": "reward and observation are made for the body's own control steps",
+    "action_repeat": "reward and observation are made for the body's own control steps; repeat a step",
     "legacy_step": "observed contact forces and foot heights stand one substep behind the state",
     "time_limit": "it is a setting of the task: task_kwargs={'time_limit': seconds}",
 }

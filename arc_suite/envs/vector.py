@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from arc_suite import checks, usage
 from arc_suite.envs import snapshots, stacked, trees
-from arc_suite.envs.base_vector import MAX_ENVS, BaseVectorEnv
+from arc_suite.envs.base_vector import MAX_ENVS, BaseVectorEnv, checked_task_kwargs
 from arc_suite.envs.calls import (
     KnownAttributes,
     LiveCommands,
@@ -168,7 +168,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self.batch = None
         refuse_arguments(others, type(self).__init__, task_name)
 
-        task_kwargs = dict(checks.mapping("task_kwargs", task_kwargs))
+        task_kwargs = dict(checked_task_kwargs(task_kwargs))
         seed = task_kwargs.pop("random", None)
         checks.name(task_kwargs.pop("on_divergence", "truncate"), ["truncate"], "on_divergence of many environments")
         self.autoreset_mode = _checked_autoreset_mode(autoreset_mode)

@@ -179,6 +179,40 @@ def check_fields(
     return checked_values
 
 
+def select_environments(model: mujoco.MjModel, fields: Any, num_envs: int, indices: np.ndarray) -> Any:
+    """Return values for `check_fields` of some environments, which share a batch, given those for all environments.
+
+    Args:
+        model: a model of the batch.
+        fields: values by name. Those with a leading axis of `num_envs` are divided, others are for every environment.
+        num_envs: number of all environments.
+        indices: indices of the batch's environments.
+
+    Raises:
+        ValueError: a leading axis of another length.
+    """
+    selected_fields = {}
+    for name, values in checks.mapping("model", fields).items():
+        selected_fields[name] = values
+        if name in CONTACT_PROPERTIES:
+            dimensions = len(CONTACT_PROPERTIES[name].shape)
+        elif name in FIELDS:
+            dimensions = field(model, name).ndim
+        else:
+            continue  # `check_fields` refuses it
+        try:
+            shape = np.shape(values)
+        except ValueError:  # lists of different lengths, which `check_fields` refuses, too
+            continue
+        if len(shape) != dimensions + 1 or shape[0] == 1:
+            continue
+        if shape[0] != num_envs:
+            count = f"{num_envs} values, one of each environment"
+            raise ValueError(f"model field {name!r}: expected {count}, got {checks.preview(values)}")
+        selected_fields[name] = np.asarray(values)[indices]
+    return selected_fields
+
+
 def _check_effect(model: mujoco.MjModel, fields: Mapping[str, Any]) -> None:
     """Raise ValueError for a field that simulations of a model do not read.
 

@@ -1,5 +1,6 @@
 """Parameters of tasks: published ones of the four robots, fitted ones of other bodies, and overrides by a caller."""
 
+import warnings
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
@@ -253,6 +254,9 @@ def positive(name: str, value: Any) -> float:
 def weights(of_task: Mapping[str, float], of_body: Mapping[str, float] = {}, changed: Any = None) -> dict[str, float]:
     """Return the weights of all terms: those of the task, some of which the body and then the caller replace.
 
+    Warns:
+        UserWarning: the caller's weight of a cost is positive.
+
     Raises:
         ValueError: an unknown term, or a weight that is no finite number.
     """
@@ -264,5 +268,8 @@ def weights(of_task: Mapping[str, float], of_body: Mapping[str, float] = {}, cha
     for name, weight in (changed or {}).items():
         number = checks.number(f"weights[{name!r}]", weight, -LARGEST, LARGEST)
         checks.name(name, weights_by_term, "term of weights")
+        if weights_by_term[name] < 0.0 < number:
+            text = f"weights[{name!r}]: {number:g} makes a bonus of this cost; {-number:g} weighs it as a cost"
+            warnings.warn(text, stacklevel=2)
         weights_by_term[name] = number
     return weights_by_term

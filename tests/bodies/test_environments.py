@@ -392,7 +392,10 @@ def test_pictures_show_each_body():
         ({"bodies": "varied:0-9", "num_envs": 4}, "num_envs: expected at least one for each of 10 bodies, got 4"),
         ({"bodies": [], "num_envs": 4}, "bodies: expected at least one, got []"),
         ({"bodies": "vared:0-9"}, "unknown family 'vared'; did you mean 'varied'? (there are: "),
-        ({"bodies": ["queen", 3]}, f"unknown robot 3 (there are: {', '.join(registry.robot_words())}, module:name)"),
+        (
+            {"bodies": ["queen", 3]},
+            f"unknown robot 3 (there are: {', '.join(registry.robot_words())}, module:name to import it)",
+        ),
         ({"task_kwargs": {"actions": "torque"}}, "unknown actions of different bodies 'torque' (there are: position)"),
         ({"task_kwargs": {"weigths": {}}}, "unknown setting of walk 'weigths'; did you mean 'weights'?"),
         ({"task_kwargs": {"history": 2}}, "history: expected 0 for different bodies, as tokens of "),

@@ -100,7 +100,7 @@ def test_summary_prints_the_figures_alone():
         (["--legs=6", "--links=0"], "flag --links=0: expected an integer in the range [1, 4]"),
         (
             ["--robot=quen"],
-            f"unknown robot 'quen'; did you mean 'queen'? (there are: {ROBOT_WORDS}, module:name)",
+            f"unknown robot 'quen'; did you mean 'queen'? (there are: {ROBOT_WORDS}, module:name to import it)",
         ),
         (["--robot=varied:0-1"], "robot 'varied:0-1': expected one body, got several"),
         (["--robot=queen", "--links=2"], "--links=2: goes with --legs or --seed, not with --robot"),

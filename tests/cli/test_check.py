@@ -16,7 +16,7 @@ from arc_suite.robots import spec_files
 from arc_suite.robots.spec import Ballast
 from arc_suite.tasks import TASKS
 
-TASK_NAMES = f"(there are: {', '.join(TASKS)}, module:name)"
+TASK_NAMES = f"(there are: {', '.join(TASKS)}, module:name to import it)"
 ROOT = Path(__file__).parents[2]
 
 

@@ -33,10 +33,13 @@ NO_PALETTE = f"unknown palette 'mos'; did you mean 'moss'? (there are: {', '.joi
         (["--legs=4", "--length=shin=2"], f"unknown link 'shin' (there are: upper, middle, lower, {ONE_LEG})"),
         (["--legs=4", "--palette=mos"], NO_PALETTE),
         (["--legs=2"], "flag --legs=2: expected an integer in the range [4, 12]"),
-        (["--robot=quen"], f"unknown robot 'quen'; did you mean 'queen'? (there are: {WORDS}, all, module:name)"),
+        (
+            ["--robot=quen"],
+            f"unknown robot 'quen'; did you mean 'queen'? (there are: {WORDS}, all, module:name to import it)",
+        ),
         (
             ["--robot=vried:7"],
-            f"unknown family 'vried'; did you mean 'varied'? (there are: {FAMILY_WORDS}, module:name)",
+            f"unknown family 'vried'; did you mean 'varied'? (there are: {FAMILY_WORDS}, module:name to import it)",
         ),
         (["--policy=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo, universal)"),
         (["--preset=fats"], f"unknown preset 'fats'; did you mean 'fast'? (there are: {', '.join(preset_names())})"),

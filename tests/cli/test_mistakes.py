@@ -7,7 +7,14 @@ import programs
 import pytest
 from tiers import tiers
 
+from arc_suite.arenas import ARENAS
 from arc_suite.tasks import TASKS
+
+
+def listed(names):
+    """Return names as errors list them."""
+    return f"(there are: {', '.join(names)}, module:name to import it)"
+
 
 BARE = "is an argument without a flag"
 ROBOTS = "(there are: queen, bastion, tick, leaper, "
@@ -141,9 +148,9 @@ MISPLACED = {
     "import arrays.npz": f"arrays.npz: {BODY}; a .npz holds arrays, such as a policy or a motion\n",
     "animate --spec=my_design.json": "my_design.json: expected a body in JSON, got a design: open it in arc-suite ",
     "animate --spec=my.clips.json": "my.clips.json: expected a body in JSON, got what arc-suite animate tells of clips",
-    "check my": "unknown robot 'my'; did you mean my.json?\n",
-    "evaluate --robot=my": "unknown robot 'my'; did you mean my.json?\n",
-    "evaluate --arena=ground": "unknown arena 'ground'; did you mean ground.png?\n",
+    "check my": "unknown robot 'my'; did you mean my.json? (there are: queen, bastion, ",
+    "evaluate --robot=my": "unknown robot 'my'; did you mean my.json? (there are: queen, bastion, ",
+    "evaluate --arena=ground": f"unknown arena 'ground'; did you mean ground.png? {listed(ARENAS)}\n",
     "animate --spec=mi -o a.glb": "unknown robot 'mi' (there are: ",
     "animate --spec=boddy -o a.glb": "unknown robot 'boddy'; did you mean body.json?\n",
     "animate --clips=walk_loop,idle -o a.glb": "unknown clip 'walk_loop'; did you mean 'walk'?\n",
@@ -225,7 +232,7 @@ FIRST_HOUR = {
     "motion --input walk.npz": f"unknown flag 'input'; the file {BARE}: walk.npz\n",
     "import --spec=go2.urdf": f"unknown flag 'spec'; the robot {BARE}: go2.urdf\n",
     "evaluate --urdf=go2.urdf": "unknown flag 'urdf'; did you mean 'spec'? (there are: ",
-    "evaluate --robot=tick --task=patrol": f"unknown task 'patrol' (there are: {', '.join(TASKS)}, module:name)\n",
+    "evaluate --robot=tick --task=patrol": f"unknown task 'patrol' {listed(TASKS)}\n",
     "evaluate --robot=tick;queen": f"unknown robot 'tick;queen'; did you mean 'tick,queen'? {ROBOTS}",
     "animate --clips=walk+run -o a.glb": "unknown clip 'walk+run'; did you mean 'walk,run'? (there are: walk, slow, ",
     "animate --clips=walking,idle,getup -o a.glb": "unknown clip 'walking'; did you mean 'walk'? not known either: 'ge",

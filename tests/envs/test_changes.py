@@ -82,6 +82,23 @@ def test_different_bodies_change_too():
     assert (rewards == plain).tolist() == [False, False, True, True]
 
 
+def test_different_bodies_take_a_value_of_each_environment():
+    """As `VectorEnv` does; bodies 0 and 2 are one batch, 1 and 3 are others."""
+    bodies = BodiesEnv("walk", 4, ["queen", "leaper", "tick", "bastion"])
+    frictions = np.array([0.2, 0.4, 0.6, 0.8])
+    bodies.change_model({"friction": frictions, "gravity": np.outer(frictions, (0.0, 0.0, -9.0))})
+    for group, indices, _ in bodies._places:
+        for model, index in zip(group.batch.models, indices, strict=True):
+            assert (model.pair_friction[:, :2] == frictions[index]).all()
+            assert model.opt.gravity[2] == pytest.approx(-9.0 * frictions[index])
+    bodies.change_model({"friction": 0.5})
+    assert all(
+        (model.pair_friction[:, 0] == 0.5).all() for place in bodies._places for model in place.group.batch.models
+    )
+    with pytest.raises(ValueError, match=r"^model field 'friction': expected 4 values, one of each environment, got "):
+        bodies.change_model({"friction": [0.2, 0.4, 0.6]})
+
+
 GEOMS = [name for name in FIELDS if name.startswith("geom_")]
 
 

@@ -350,9 +350,12 @@ def there(names):
         ),
         (
             {"domain_name": "quen"},
-            f"unknown robot 'quen'; did you mean 'queen'? ({there(registry.robot_words())}, module:name)",
+            f"unknown robot 'quen'; did you mean 'queen'? ({there(registry.robot_words())}, module:name to import it)",
         ),
-        ({"task_name": "wlak"}, f"unknown task 'wlak'; did you mean 'walk'? ({there(TASKS)}, module:name)"),
+        (
+            {"task_name": "wlak"},
+            f"unknown task 'wlak'; did you mean 'walk'? ({there(TASKS)}, module:name to import it)",
+        ),
     ],
 )
 def test_bad_arguments_are_one_line(kwargs, message):

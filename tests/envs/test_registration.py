@@ -106,8 +106,9 @@ for call in (
 """
     words = [*ROBOTS, "hopper", *registry.robot_words()[len(ROBOTS) :]]
     assert package(code) == [
-        f"unknown robot 'hoper'; did you mean 'hopper'? (there are: {', '.join(words)}, module:name)",
-        f"unknown task 'strol'; did you mean 'stroll'? (there are: {', '.join(TASKS)}, stroll, module:name)",
+        f"unknown robot 'hoper'; did you mean 'hopper'? (there are: {', '.join(words)}, module:name to import it)",
+        f"unknown task 'strol'; did you mean 'stroll'? (there are: {', '.join([*TASKS, 'stroll'])}, "
+        "module:name to import it)",
         "robot 'hopper': cannot import nowhere: No module named 'nowhere'; "
         "start in the folder of nowhere.py, or put it on Python's path",
     ]

@@ -46,10 +46,17 @@ def test_an_episode_of_dm_control(capsys):
     assert "posture" in capsys.readouterr().out
 
 
+@pytest.mark.slow
+def test_a_body_stands_on_the_ground_of_a_composer_task():
+    variables = run_python(DM_CONTROL, 1)
+    assert 0.7 < variables["timestep"].reward < 0.85
+    assert variables["environment"].physics.data.ncon >= 6
+
+
 def test_settings_of_environments_that_dm_control_has():
     flat = suite.load("tick", "walk", task_kwargs={"random": 7}, environment_kwargs={"flat_observation": True})
     assert flat.reset().observation["observations"].shape == (199,)
-    for name, value in {"time_limit": 5, "control_timestep": 0.02, "n_sub_steps": 2}.items():
+    for name, value in {"time_limit": 5, "control_timestep": 0.02, "n_sub_steps": 2, "action_repeat": 2}.items():
         with pytest.raises(ValueError, match=f"environment setting '{name}': "):
             suite.load("tick", "walk", environment_kwargs={name: value})
     assert suite.BENCHMARKING == arc_suite.BENCHMARKING and ("queen", "walk") in suite.ALL_TASKS

@@ -24,14 +24,22 @@ EIGHTEEN = {"posture": np.zeros((2, 17)), "velocities": np.zeros((2, 24))}  # ve
 MODES, TRUNCATE = "(there are: NextStep, SameStep, Disabled)", "(there are: truncate)"
 NAN = np.where(np.arange(12) == 7, np.nan, 0.0)
 PICTURE = {"render_mode": "rgb_array", "width": 32, "height": 24}
-TASK_NAMES = f"(there are: {', '.join(TASKS)}, module:name)"
-ARENA_NAMES = f"(there are: {', '.join(ARENAS)}, module:name)"
-DOMAINS = f"(there are: {', '.join(registry.robot_words())}, module:name)"
+TASK_NAMES = f"(there are: {', '.join(TASKS)}, module:name to import it)"
+ARENA_NAMES = f"(there are: {', '.join(ARENAS)}, module:name to import it)"
+DOMAINS = f"(there are: {', '.join(registry.robot_words())}, module:name to import it)"
 PRESETS = (
     "(there are: slow, medium, fast, tuned, refined, straight, steered, surefooted, climbing, braced, reactive, "
     "sighted, leaping, planned, tracked, rising, crossing)"
 )
 CAMERAS, NAMED = "['tracking', 'portrait', 'profile', 'eye']", "(there are: tracking, portrait, profile, eye)"
+ONE_BODY = (
+    "arc_suite/bodies-walk-v0: gymnasium.make_vec makes these environments, with num_envs; gymnasium.make takes a "
+    "robot in place of bodies, or arc_suite.envs.gym.Env a body and 'walk'"
+)
+ONE_MAPPING = (
+    "task_kwargs: expected one mapping for all environments, got [{}, {}]; "
+    "change_settings with a mask sets those of some"
+)
 PLACED_CAMERA = mujoco.MjvCamera()
 PLACED = f"camera_id: expected one of {CAMERAS}; an MjvCamera is for physics.render"
 BLOCKS = "observation: expected blocks posture and velocities by name, as `split` of a task gives them"
@@ -205,6 +213,9 @@ CASES = [
     (make(**PICTURE, camera_id=PLACED_CAMERA), PLACED),
     (envs(**PICTURE, camera_id=PLACED_CAMERA), PLACED),
     (make(**PICTURE, camera_id="prtrait"), f"unknown camera 'prtrait'; did you mean 'portrait'? {NAMED}"),
+    (lambda w: gymnasium.make("arc_suite/bodies-walk-v0"), ONE_BODY),
+    (envs(task_kwargs=[{}, {}]), ONE_MAPPING),
+    (bodies(task_kwargs=[{}, {}]), ONE_MAPPING),
     (envs(**PICTURE, camera_id=9), f"no camera 9: expected -1 (free) to 3, or one of {CAMERAS}"),
     (render(0, 32), "height: expected an integer from 1 to 2160, got 0"),
     (render(24, 99999), "width: expected an integer from 1 to 3840, got 99999"),

@@ -80,7 +80,7 @@ def test_policies_that_are_no_demonstrators_give_the_actions_that_a_task_takes()
         (("cgp", "queen"), "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo, universal)"),
         (
             ("zero", "quen"),
-            f"unknown robot 'quen'; did you mean 'queen'? (there are: {ROBOT_WORDS}, module:name)",
+            f"unknown robot 'quen'; did you mean 'queen'? (there are: {ROBOT_WORDS}, module:name to import it)",
         ),
         (("cpg", "queen", "midium"), f"unknown preset 'midium'; did you mean 'medium'? (there are: {ALL})"),
         (("cpg", generate(4, 2), "tuned"), f"unknown preset 'tuned' (there are: {GENERAL}, posed)"),

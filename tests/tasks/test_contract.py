@@ -165,7 +165,7 @@ def test_an_environment_is_bit_equal_to_a_single_environment(task_name, body, se
     assert episodes >= 3
 
 
-ARENA_NAMES = f"(there are: {', '.join(ARENAS)}, module:name)"
+ARENA_NAMES = f"(there are: {', '.join(ARENAS)}, module:name to import it)"
 SINGLE = "arc_suite/queen-walk-v0"  # whose domain and task other arguments take the place of
 
 

@@ -1,6 +1,7 @@
 """Walk: the paper's observation, start, numbers and ending."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -131,3 +132,14 @@ def test_bad_settings_are_one_line_errors(settings, message):
 def test_bad_settings_of_the_environment_are_one_line():
     with refused("unknown environment setting 'flat_observations'; did you mean 'flat_observation'?", begins=True):
         arc_suite.load("queen", "walk", None, {"flat_observations": True})
+
+
+@pytest.mark.parametrize("task", ["walk", "steer", "recover"])
+def test_a_cost_with_a_positive_weight_is_a_warning_of_one_line(task):
+    text = r"^weights\['control'\]: 0.01 makes a bonus of this cost; -0.01 weighs it as a cost$"
+    with pytest.warns(UserWarning, match=text):
+        arc_suite.load("queen", task, {"weights": {"control": 0.01}})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        arc_suite.load("queen", task, {"weights": {"control": -0.01}})
+        arc_suite.load("queen", task, {"weights": {"control": 0.0}})

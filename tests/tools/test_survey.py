@@ -8,7 +8,7 @@ import pytest
 from arc_suite.registry import FAMILIES
 from arc_suite.tasks import TASKS
 
-FAMILY_WORDS = f"(there are: {', '.join(FAMILIES)}, module:name)"
+FAMILY_WORDS = f"(there are: {', '.join(FAMILIES)}, module:name to import it)"
 BODIES = ("--first=40", "--legs=6", "--links=3", "--seconds=12")
 IN_PHASE = ("--set=duty_factor=0.6", "--set=phase_offsets=0.0")
 
@@ -46,7 +46,10 @@ def test_legs_in_phase_fail_and_their_bodies_are_named():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ("--task=steer2", f"unknown task 'steer2'; did you mean 'steer'? (there are: {', '.join(TASKS)}, module:name)"),
+        (
+            "--task=steer2",
+            f"unknown task 'steer2'; did you mean 'steer'? (there are: {', '.join(TASKS)}, module:name to import it)",
+        ),
         ("--legs=6 --family=varied", "--legs=6: goes with the family random, not with varied"),
         ("--count=0", "flag --count=0: expected an integer in the range [1, 100000]"),
         ("--picture=missing/a.png", "cannot write missing/a.png: no such file or directory"),

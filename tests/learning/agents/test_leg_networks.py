@@ -161,7 +161,7 @@ def test_a_file_of_a_run_is_read_without_the_policy_that_it_started_from(tmp_pat
 
 
 def test_a_network_is_one_of_two():
-    with refused("unknown network 'leg'; did you mean 'legs'? (there are: perceptron, legs, module:name)"):
+    with refused("unknown network 'leg'; did you mean 'legs'? (there are: perceptron, legs, module:name to import it)"):
         ProximalPolicy(network="leg")
     with refused("minibatch: expected at most the transitions of a horizon, got 4096"):
         ProximalPolicy(network="legs", minibatch=4096)

@@ -59,7 +59,7 @@ def test_a_function_that_makes_no_architecture_is_one_line(networks):
         architectures.of(task, "mine")
     with refused("network 'lost': cannot import 'nowhere:Deep.of': No module named 'nowhere'; start ", begins=True):
         architectures.of(task, "lost")
-    names = "(there are: perceptron, legs, mine, lost, half, module:name)"
+    names = "(there are: perceptron, legs, mine, lost, half, module:name to import it)"
     with refused(f"unknown network 'lost_'; did you mean 'lost'? {names}"):
         architectures.of(task, "lost_")
 

@@ -28,7 +28,7 @@ ROOT = pathlib.Path(__file__).parents[3]
 TINY = ["--robot=tick", "--algorithm=sope_eo", "--set", "time_limit=2", "--steps=200", "--evaluate_every=100"]
 for number in ("hidden=16", "batch=8", "start_steps=20", "phase_every=100", "phase_updates=60", "check_every=20"):
     TINY += ["--hp", number]
-WORDS = f"(there are: {', '.join(registry.robot_words())}, module:name)"
+WORDS = f"(there are: {', '.join(registry.robot_words())}, module:name to import it)"
 FINISHED = re.compile(
     r"runs/tick-walk-sope_eo-0: finished, return \d+\.\d at step 200, deviation \d+\.\d, score -?\d\.\d\d "
     r"\(standing still \d+\.\d, demonstrator refined \d+\.\d, standard errors \d+\.\d and \d+\.\d, "
