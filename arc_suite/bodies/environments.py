@@ -465,8 +465,10 @@ def refuse_one_environment(task_name: str, **others: Any) -> None:
         ValueError: always; it says what makes them, and what makes one environment.
     """
     bodies_id = registry.env_id("bodies", registry.task_of(task_name))
-    one = f"gymnasium.make takes a robot in place of bodies, or arc_suite.envs.gym.Env a body and {task_name!r}"
-    raise ValueError(f"{bodies_id}: gymnasium.make_vec makes these environments, with num_envs; {one}")
+    other_makers = (
+        f"gymnasium.make takes a robot in place of bodies, or arc_suite.envs.gym.Env a body and {task_name!r}"
+    )
+    raise ValueError(f"{bodies_id}: gymnasium.make_vec makes these environments, with num_envs; {other_makers}")
 
 
 def _check_same_privileged_blocks(tasks: Sequence[Task]) -> None:
