@@ -92,22 +92,20 @@ def animate(
     names = [clips] if isinstance(clips, str) else list(clips)
     path = Path(path)
     extension = _check_arguments(path, names, fps, options)
+    clip_options = {"weight": weight, "straight": straight, "plant": plant}
     recording_progress = functools.partial(progress, desc="recording", unit="clip", leave=False)
     with contextlib.ExitStack() as stack:
         temporary = stack.enter_context(files.writing(path))
         metrics = stack.enter_context(files.writing_json(metrics_file(path)))
-        if names == [ALL]:
-            names = catalog.clip_names()
+        names = catalog.clip_names() if names == [ALL] else names
         catalog_names = [name for name in names if not _is_motion(name)]
         made_clips = [_read_clip(setup.body, name, fps) for name in names if _is_motion(name)]
         left_out: dict[str, str] = {}
         if catalog_names or not names:
-            made_clips += make_clips(
-                setup, catalog_names, policy, preset, fps, recording_progress, straight, plant, weight, left_out
-            )
+            arguments = (setup, catalog_names, policy, preset, fps, recording_progress)
+            made_clips += make_clips(*arguments, left_out=left_out, **clip_options)
         _check_names(made_clips)
         if extension == GLB_EXTENSION:
-            clip_options = {"weight": weight, "straight": straight, "plant": plant}
             metrics |= _write_glb(temporary, setup.body, made_clips, clip_options, left_out, **options)
         elif extension == SHEET_EXTENSION:
             metrics |= _write_sheet(temporary, path.name, setup.body, made_clips, left_out, **options)
