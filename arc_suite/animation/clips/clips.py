@@ -118,7 +118,7 @@ def clips(
     drafts = make_drafts(recorder, names, progress, reasons, straight, plant, character)
     _report_left_out(setup.body, names, reasons)
     if left_out is not None:
-        left_out |= {name: reasons[name] for name in names if name in reasons}
+        left_out.update((name, reasons[name]) for name in names if name in reasons)
     body = setup.body
     sampled_names = drafts.keys() & {*names, "walk"}  # starts and stops swing as the walk, even if it is not asked for
     samples = {name: sample_clip(name, body, drafts[name], fps) for name in sampled_names}
