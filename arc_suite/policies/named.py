@@ -70,7 +70,14 @@ def _ppo(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -
 
 
 def _universal(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
-    """Return the policy of any body of the package, for walk or for tasks with a command."""
+    """Return the policy of any body of the package, for walk or for tasks with a command.
+
+    Warns:
+        UserWarning: a body whose motors or timesteps the suite did not choose, unlike those of the policy's training.
+    """
+    if body.source or body.simulation or any(joint.motor for joint in body.joints):
+        text = f"policy universal: may fall or hardly walk, as {body.name} brings motors or timesteps of its own"
+        warnings.warn(text, stacklevel=_STACK_LEVEL - 1)
     if task is None:
         task, _ = prepare_task(body, "walk")
     universal = registry.resolve(_UNIVERSAL_MODULE)

@@ -96,7 +96,10 @@ def test_summary_prints_the_figures_alone():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--legs=3"], "flag --legs=3: expected an integer in the range [4, 12]"),
+        (
+            ["--legs=3"],
+            "flag --legs=3: expected an integer in the range [4, 12]; a body of 3 legs is a spec, --spec=FILE",
+        ),
         (["--legs=6", "--links=0"], "flag --links=0: expected an integer in the range [1, 4]"),
         (
             ["--robot=quen"],

@@ -65,6 +65,12 @@ def test_any_body_walks_by_it(body, task):
     assert environment.task.progress["speed" if task == "walk" else "tracking"] > 0.1
 
 
+def test_bodies_with_motors_of_their_own_are_warned_of():
+    line = r"^policy universal: may fall or hardly walk, as queen brings motors or timesteps of its own$"
+    with pytest.warns(UserWarning, match=line):
+        policies.policy("universal", "queen")
+
+
 def test_of_another_robot_task_or_body():
     line = r"^policy ppo: none for tick-gaps \(there are: .*tick-walk.*\); arc-suite train .*universal"
     with pytest.raises(ValueError, match=line):
