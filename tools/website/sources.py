@@ -11,7 +11,7 @@ from website import markdown, players, reference, robots, tasks
 from website.returns import ROOT
 
 # The repository's pages, as patterns of paths.
-PAGES = ("CHANGELOG.md", "CONTRIBUTING.md", "docs/*.md", "examples/**/*.md", "studies/**/*.md")
+PAGES = ("CHANGELOG.md", "CONTRIBUTING.md", "docs/*.md", "examples/**/*.md", "studies/**/*.md", "web/*.md")
 
 README = ROOT / "README.md"
 DOCS_README = ROOT / "docs" / "README.md"
