@@ -92,7 +92,7 @@ def animate(
     names = [clips] if isinstance(clips, str) else list(clips)
     path = Path(path)
     extension = _check_arguments(path, names, fps, options)
-    clip_options = {"weight": weight, "straight": straight, "plant": plant}
+    clip_options: dict[str, Any] = {"weight": weight, "straight": straight, "plant": plant}
     recording_progress = functools.partial(progress, desc="recording", unit="clip", leave=False)
     with contextlib.ExitStack() as stack:
         temporary = stack.enter_context(files.writing(path))
