@@ -97,17 +97,17 @@ def score_policies(division: str) -> None:
 
     Raises:
         ValueError: a name of other characters than letters, digits, `_`, `-` and `.`, or a folder that
-            `entries.score_policies` refuses.
+            `entries.find_policies` or `entries.score_policies` refuses.
         OSError: a file cannot be read.
     """
     folder = Path(FLAGS.policies)
     name = FLAGS.name or folder.resolve().name
     benchmark.check_name(name)
     files.check_folder(FLAGS.results)
-    count = len(entries.find_policies(folder))
+    paths_by_run = entries.find_policies(folder)
     size = SEEDS * len(PLACES)
-    say(f"{folder}: {count} of the {size} policies of an entry, {evaluation.EPISODES} episodes each")
-    judged = entries.score_policies(folder, progress)
+    say(f"{folder}: {len(paths_by_run)} of the {size} policies of an entry, {evaluation.EPISODES} episodes each")
+    judged = entries.score_policies(folder, paths_by_run, progress)
     studies = Path(FLAGS.results)
     lines_by_run = {entries.run_name(policy.score): policy.lines for policy in judged}
     publication.write_finals(studies / f"{division}-{name}", lines_by_run)

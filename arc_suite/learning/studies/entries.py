@@ -43,33 +43,38 @@ class Judged(NamedTuple):
     lines: finals.Lines
 
 
-def score_policies(folder: Path, progress: Callable[..., Any]) -> list[Judged]:
+def score_policies(
+    folder: Path, paths_by_run: Mapping[tuple[str, str, int], Path], progress: Callable[..., Any]
+) -> list[Judged]:
     """Play the episodes that judge the policies of a folder, and return their scores and lines.
 
-    An entry of the folder is a policy if it has an ending of `ENDINGS` or a name of `NAMES`, or is the folder of a
-    run. Weights, statistics, notes, and names that begin with `.` or `_` are skipped.
-
     Args:
-        folder: folder of policies named `ROBOT-TASK-SEED`. A policy is a zip of stable-baselines3, a policy file
-            (.npz), a module with a function `MAKE` (see `policies.policy`), or the folder of a run.
+        folder: folder of policies. A policy is a zip of stable-baselines3, a policy file (.npz), a module with a
+            function `MAKE` (see `policies.policy`), or the folder of a run.
+        paths_by_run: paths of the policies by robot, task and seed; see `find_policies`.
         progress: makes a progress bar as `tqdm` does.
 
     Raises:
-        ValueError: no policy in the folder, another name, two policies of a place and seed, or one that does not fit.
+        ValueError: a policy that does not fit.
         OSError: a file cannot be read.
     """
-    paths_by_run = find_policies(folder)
     with contextlib.ExitStack() as stack:
         has_module = any(path.suffix == named.PYTHON_EXTENSION for path in paths_by_run.values())
         frozen_folder = stack.enter_context(frozen.freeze(folder)) if has_module else None
         return [
-            _judge_policy(path, place_setup(*place), seed, frozen_folder, progress)
-            for (*place, seed), path in paths_by_run.items()
+            _judge_policy(path, place_setup(robot, task), seed, frozen_folder, progress)
+            for (robot, task, seed), path in paths_by_run.items()
         ]
 
 
 def find_policies(folder: Path) -> dict[tuple[str, str, int], Path]:
     """Return the paths of the policies in a folder by robot, task and seed, in the order of their names.
+
+    An entry of the folder is a policy if it has an ending of `ENDINGS` or a name of `NAMES`, or is the folder of a
+    run. Weights, statistics, notes, and names that begin with `.` or `_` are skipped.
+
+    Args:
+        folder: folder of policies named `ROBOT-TASK-SEED`.
 
     Raises:
         ValueError: no policy in the folder, another name, or two policies of a place and seed.

@@ -315,7 +315,7 @@ def test_policies_of_other_names_are_refused_before_any_plays(tmp_path, name, li
     for each in (path, tmp_path / "tick-walk-0.npz"):
         each.write_bytes(b"")
     with refused(f"{tmp_path / name.partition('/')[0]}: {line}"):
-        entries.score_policies(tmp_path, progress=None)
+        entries.find_policies(tmp_path)
 
 
 MODULE = """
@@ -373,7 +373,8 @@ def test_modules_are_scored_and_what_is_no_policy_is_left_out(tmp_path, monkeypa
     for name in ("README.md", ".hidden.py", "_helpers.py", "tick-walk-2_vecnormalize.pkl", "studies/other.zip"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_bytes(b"")
-    (judged,) = entries.score_policies(tmp_path, functools.partial(tqdm, disable=True))
+    paths_by_run = entries.find_policies(tmp_path)
+    (judged,) = entries.score_policies(tmp_path, paths_by_run, functools.partial(tqdm, disable=True))
     found = judged.score
     assert found[:3] == ("tick", "walk", 2) and found.score == pytest.approx(0.0, abs=0.05)
     with frozen.freeze(tmp_path) as copy:
