@@ -55,7 +55,6 @@ class Report(NamedTuple):
         returns: over the episodes.
         zero: mean return of standing still.
         score: 0 for standing still, 1 for the best demonstrator; None where `flaw` says why there is none.
-        flaw: see `anchors.Anchors.flaw`.
         length: control steps.
         progress: the task's metrics by name.
         paper_return: return of the paper's demonstrator; None for other setups than the paper's.
@@ -68,12 +67,16 @@ class Report(NamedTuple):
     returns: Summary
     zero: float
     score: float | None
-    flaw: str
     length: Summary
     progress: Mapping[str, Summary]
     paper_return: float | None
     episodes: Sequence[EpisodeResult]
     scale: anchors.Anchors
+
+    @property
+    def flaw(self) -> str:
+        """Why returns have no scores; "" where they have: see `anchors.Anchors.flaw`."""
+        return self.scale.flaw
 
     @property
     def caution(self) -> str:
@@ -237,7 +240,6 @@ def report(
         returns=returns,
         zero=zero,
         score=score if math.isfinite(score) else None,
-        flaw=scale.flaw,
         length=statistics.summary([episode.length for episode in episodes]),
         progress={name: statistics.summary([episode.progress[name] for episode in episodes]) for name in metrics},
         paper_return=protocol.paper_return(setup),

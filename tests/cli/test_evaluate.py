@@ -103,7 +103,7 @@ def test_the_preset_is_the_one_that_suits_task_and_body(tmp_path):
 def test_a_caution_names_the_demonstrator(score, metrics, preset, line):
     means = {name: statistics.summary([value]) for name, value in metrics.items()}
     setup = Setup.of("queen", "rough")
-    values = {"returns": means, "zero": 0.0, "flaw": "", "length": means, "paper_return": None, "episodes": ()}
+    values = {"returns": means, "zero": 0.0, "length": means, "paper_return": None, "episodes": ()}
     scale = anchors.Anchors(0.0, 1.0, "climbing")
     report = reports.Report(setup, preset, score=score, progress=means, scale=scale, **values)
     assert line in report.caution if line else report.caution == ""
