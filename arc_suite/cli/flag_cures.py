@@ -1,10 +1,11 @@
 """Answers to flags of other programs and libraries, which no flag of the suite replaces."""
 
+from arc_suite.robots.field_hints import CHARACTER_CURE
+
 _RESUME = "the same command goes on where it was interrupted"
 _DEVICE = "learners compute on the device of JAX; see docs/gpu.md"
 _WINDOW = "arc-suite view alone opens a window"
 _AMOUNT = "programs have one amount of output; 2>/dev/null hides progress and warnings"
-_CHARACTER = "arc-suite animate --weight takes a character: heavy, nervous or old"
 _FORM = "arc-suite build_model --torso, --head and --tail, with --json, writes a spec for --spec"
 CURES = {
     **dict.fromkeys(("continue", "resume"), _RESUME),
@@ -12,7 +13,7 @@ CURES = {
     **dict.fromkeys(("gui", "headless", "no_render", "nogui", "offscreen"), _WINDOW),
     **dict.fromkeys(("debug", "log_level", "quiet", "silent", "verbose", "verbosity"), _AMOUNT),
     **dict.fromkeys(("alsologtostderr", "logtostderr", "stderrthreshold"), _AMOUNT),
-    **dict.fromkeys(("character", "mood", "personality", "temperament"), _CHARACTER),
+    **dict.fromkeys(("character", "mood", "personality", "temperament"), CHARACTER_CURE),
     **dict.fromkeys(("deterministic", "stochastic"), "the policy of a run acts by its mean action"),
     **dict.fromkeys(("render", "render_mode"), "arc-suite render films a policy, arc-suite view shows it"),
     **dict.fromkeys(("head", "tail", "torso"), _FORM),

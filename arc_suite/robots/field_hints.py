@@ -16,14 +16,14 @@ _SPEED = "it is a setting of tasks, --set target_velocity=VALUE"
 _CHAIN = "links of a leg are a chain, from the torso outwards"
 _TORQUE = "gear of the motor is its largest torque, N m"
 _GROUND = "--arena or a task such as rough has the ground"
-_CHARACTER = "arc-suite animate --weight takes a character: heavy, nervous or old"
+CHARACTER_CURE = "arc-suite animate --weight takes a character: heavy, nervous or old"
 _FORM = "docs/bodies.md: heads, tails and ballast"
 _CURES = {
     **dict.fromkeys(("inertia", "mass", "weight"), _WEIGHT),
     **dict.fromkeys(("color", "colors", "material", "materials", "rgba"), _COLORS),
     **dict.fromkeys(("arena", "floor", "ground", "terrain"), _GROUND),
     **dict.fromkeys(("antennae", "eye", "eyes", "head", "horns", "neck", "tail"), _FORM),
-    **dict.fromkeys(("character", "mood", "personality", "style", "temperament"), _CHARACTER),
+    **dict.fromkeys(("character", "mood", "personality", "style", "temperament"), CHARACTER_CURE),
     **dict.fromkeys(("children", "parent"), _CHAIN),
     **dict.fromkeys(("max_torque", "torque"), _TORQUE),
     **dict.fromkeys(("speed", "velocity"), _SPEED),
