@@ -14,7 +14,6 @@ from arc_suite.tasks import TASKS
 
 _MAX_SIZE = 1 << 20  # bytes of a file of Python whose names an error lists
 _MAX_NAMES = 8  # in an error
-_RUNS = "runs"  # folder of runs, by default
 _METHODS = ("act", "predict", "select_action", "get_action")  # by which agents of other libraries act
 _AS_FUNCTION = "write a function that loads it, and name it as file.py:function"
 # By extension of a file that is no policy: what the file is, and what to do instead.
@@ -60,8 +59,8 @@ def refuse_other_words(name: Any, policy_names: Iterable[str]) -> None:
     if isinstance(name, str) and os.path.isfile(f"{name}.py"):
         first_name, *_ = [*_list_functions(Path(f"{name}.py")), f"{name}.py:NAME"]
         raise ValueError(f"unknown policy {checks.preview(name)}; did you mean {first_name}?")
-    if isinstance(name, str) and os.path.isfile(os.path.join(_RUNS, name, network.FILE)):
-        raise ValueError(f"unknown policy {checks.preview(name)}; did you mean {_RUNS}/{name}?")
+    if isinstance(name, str) and os.path.isfile(os.path.join(files.RUNS, name, network.FILE)):
+        raise ValueError(f"unknown policy {checks.preview(name)}; did you mean {files.RUNS}/{name}?")
     hint = files.suggest_path(name) if isinstance(name, str) and not checks.hint(name, policy_names) else ""
     if hint:
         raise ValueError(f"unknown policy {checks.preview(name)}{hint}")

@@ -33,7 +33,7 @@ flags.DEFINE_list("places", _PLACE_NAMES, "Places to run, ROBOT-TASK. [default: 
 flags.DEFINE_integer("jobs", None, "Runs at a time. [default: as many as cores]", lower_bound=1)
 flags.DEFINE_string("policies", None, "Folder of policies to score in place of runs.")
 flags.DEFINE_string("name", None, "Of these policies in the table. [default: the name of the folder]")
-flags.DEFINE_string("runs", "runs", "Folder of the runs.")
+flags.DEFINE_string("runs", files.RUNS, "Folder of the runs.")
 flags.DEFINE_string("results", "studies", "Folder of the tables and reports.")
 
 _FLAGS_OF_RUNS = ("algorithm", "seeds", "places", "jobs", "runs")

@@ -122,6 +122,13 @@ def upload(tab, path, content):
     chooser.value.set_files(path)
 
 
+def reset(served, tab):
+    """Return to the creature with which the page began."""
+    open_tab(tab, "Body")
+    tab.get_by_role("button", name="Reset").click()
+    served.until(lambda: served.session.creature.sketch == Sketch(legs=8, links=2))
+
+
 def test_it_listens_on_this_machine_alone_and_never_asks_for_a_public_address(served):
     assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\?token=[\w-]{22}", served.addresses[0])
     assert pages.Server.request_share_url is not viser.ViserServer.request_share_url
@@ -317,9 +324,7 @@ def test_a_saved_creature_comes_back(served, tab):
 
 
 def test_one_leg_and_the_leg_across(served, tab):
-    open_tab(tab, "Body")
-    tab.get_by_role("button", name="Reset").click()
-    served.until(lambda: served.session.creature.sketch == Sketch(legs=8, links=2))
+    reset(served, tab)
     choose(tab, "Legs to change", "l1")
     press(tab, "l1_lower", "ArrowRight", 4)
     served.until(
@@ -469,26 +474,29 @@ def test_an_imported_robot_changes_its_size_and_its_links(served, tab, tmp_path)
 
 
 def test_files_are_saved(served, tab):
+    reset(served, tab)
     name, content = saved(tab, "Spec")
-    assert name == "walker_6x2.json" and body_from_json(content) == served.session.creature.setup.body
+    assert name == "walker_8x2.json" and body_from_json(content) == served.session.creature.setup.body
     name, content = saved(tab, "MJCF")
-    assert name == "walker_6x2.xml" and mujoco.MjModel.from_xml_string(content.decode()).nu == 12
+    assert name == "walker_8x2.xml" and mujoco.MjModel.from_xml_string(content.decode()).nu == 16
     name, content = saved(tab, "Picture")
-    assert name == "walker_6x2.png" and content.startswith(b"\x89PNG")
+    assert name == "walker_8x2.png" and content.startswith(b"\x89PNG")
 
 
 def test_lines_are_copied(served, tab):
+    reset(served, tab)
     open_tab(tab, "Files")
     tab.get_by_role("button", name="Copy command").click()
     line = tab.evaluate("navigator.clipboard.readText()")
-    assert line == "arc-suite view --spec walker_6x2.json --task directed"
+    assert line == "arc-suite view --spec walker_8x2.json --task directed"
 
 
 def test_another_visitor_sees_the_same_creature(served, tab):
+    reset(served, tab)
     served.session.pause(True)
     other = tabs.new(tab.context)
     other.goto(served.addresses[0])
-    other.get_by_text("walker_6x2 stands and can take steps").wait_for()
+    other.get_by_text("walker_8x2 stands and can take steps").wait_for()
     other.close()
     served.session.pause(False)
     steps = served.session.episodes.steps
