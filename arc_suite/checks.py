@@ -9,7 +9,7 @@ import os
 import pkgutil
 import re
 import sys
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -269,9 +269,13 @@ def name(
     if isinstance(value, Hashable) and value in valid_names:  # arrays, which are not hashable, compare by element
         return value
     listed_names = [*valid_names, *suggestions]
-    choices = [*listed_names, *descriptions]
-    list_text = f"there are: {', '.join(choices)}" if choices else "there are none"
-    raise ValueError(f"unknown {kind} {preview(value)}{hint(value, listed_names)} ({list_text})")
+    choices = list_choices([*listed_names, *descriptions])
+    raise ValueError(f"unknown {kind} {preview(value)}{hint(value, listed_names)} {choices}")
+
+
+def list_choices(names: Collection[str]) -> str:
+    """Return the part of an error that lists valid names."""
+    return f"(there are: {', '.join(names)})" if names else "(there are none)"
 
 
 def names(what: str, value, valid: Iterable[str], kind: str) -> tuple[str, ...]:

@@ -302,8 +302,8 @@ def _refuse_name_of_file(kind: str, text: str, extensions: Iterable[str], names:
     """Raise ValueError for a word that is the name of a file without its extension; the error lists names."""
     cure = files.suggest_extension(text, extensions)
     if cure:
-        choices = ", ".join([*names, _NAME_IN_MODULE])
-        raise ValueError(f"unknown {kind} {checks.preview(text)}{cure} (there are: {choices})")
+        choices = checks.list_choices([*names, _NAME_IN_MODULE])
+        raise ValueError(f"unknown {kind} {checks.preview(text)}{cure} {choices}")
 
 
 def _family_words() -> list[str]:

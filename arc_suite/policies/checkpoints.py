@@ -62,8 +62,8 @@ def at(run: Path, step: int) -> Path:
     """
     steps = [agent.steps for agent in agents(run / FOLDER)]
     if step not in steps:
-        names = ", ".join(map(str, steps)) or "none"
-        raise ValueError(f"{run}: keeps no checkpoint at {step} (there are: {names})")
+        choices = checks.list_choices([str(step) for step in steps])
+        raise ValueError(f"{run}: keeps no checkpoint at {step} {choices}")
     return run / FOLDER / str(step)
 
 

@@ -69,7 +69,7 @@ def refuse_other_words(name: Any, policy_names: Iterable[str]) -> None:
 def _refuse_file_of_python(path: Path) -> NoReturn:
     """Raise ValueError that lists the functions and classes of a file, which is not run."""
     names = _list_functions(path)
-    name_list = f" (there are: {', '.join(names[:_MAX_NAMES])})" if names else ""
+    name_list = f" {checks.list_choices(names[:_MAX_NAMES])}" if names else ""
     expected = "a function in it that makes a policy from a robot's name"
     raise ValueError(checks.quote(f"policy '{path}': expected {path}:NAME, {expected}{name_list}"))
 

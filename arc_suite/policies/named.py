@@ -63,9 +63,9 @@ def _ppo(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -
     task_name = "walk" if task is None else task.name
     path = _packaged_path(body, task_name)
     if not is_packaged(body, task_name):
-        names = ", ".join(sorted(file.stem for file in PACKAGED.glob(f"*{network.EXTENSION}")))
+        choices = checks.list_choices(sorted(file.stem for file in PACKAGED.glob(f"*{network.EXTENSION}")))
         hint = "arc-suite train makes others, and universal moves any body"
-        raise ValueError(f"policy ppo: none for {path.stem} (there are: {names}); {hint}")
+        raise ValueError(f"policy ppo: none for {path.stem} {choices}; {hint}")
     return _from_network(path, body, task)
 
 

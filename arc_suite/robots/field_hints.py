@@ -55,4 +55,4 @@ def describe_unknown(name: str, kind: type) -> str:
         cure = f"; it is a field of a {owners[0]}"
     else:
         cure = checks.hint(name, names)
-    return f"unknown field {checks.preview(name)}{cure} (there are: {', '.join(names)})"
+    return f"unknown field {checks.preview(name)}{cure} {checks.list_choices(names)}"

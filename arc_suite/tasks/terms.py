@@ -71,7 +71,7 @@ def _raise_mismatch(terms: Mapping, weights: Mapping) -> None:
         checks.name(name, terms, "term of weights")
     unknown_term = next(name for name in terms if name not in weights)
     hint = checks.hint(unknown_term, weights)
-    raise ValueError(f"term {checks.preview(unknown_term)} has no weight{hint} (there are: {', '.join(weights)})")
+    raise ValueError(f"term {checks.preview(unknown_term)} has no weight{hint} {checks.list_choices(weights)}")
 
 
 def _limit_costs(terms: Mapping, weights: Mapping, limit) -> dict:

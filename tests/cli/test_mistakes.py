@@ -7,6 +7,7 @@ import programs
 import pytest
 from tiers import tiers
 
+from arc_suite.animation.clips.catalog import CLIPS
 from arc_suite.arenas import ARENAS
 from arc_suite.tasks import TASKS
 
@@ -17,6 +18,7 @@ def listed(names):
 
 
 BARE = "is an argument without a flag"
+GETUP = f"{listed(CLIPS)}; not known either: 'getup'\n"
 ROBOTS = "(there are: queen, bastion, tick, leaper, "
 # What follows the name of the program; those of the first part have a cure that was missing once.
 CURED = {
@@ -235,7 +237,7 @@ FIRST_HOUR = {
     "evaluate --robot=tick --task=patrol": f"unknown task 'patrol' {listed(TASKS)}\n",
     "evaluate --robot=tick;queen": f"unknown robot 'tick;queen'; did you mean 'tick,queen'? {ROBOTS}",
     "animate --clips=walk+run -o a.glb": "unknown clip 'walk+run'; did you mean 'walk,run'? (there are: walk, slow, ",
-    "animate --clips=walking,idle,getup -o a.glb": "unknown clip 'walking'; did you mean 'walk'? not known either: 'ge",
+    "animate --clips=walking,idle,getup -o a.glb": f"unknown clip 'walking'; did you mean 'walk'? {GETUP}",
     "animate --weight=old,nervous -o a.glb": "weight: expected one name or one number, got 'old,nervous'\n",
     "animate --temperament=old": f"unknown flag 'temperament'; arc-suite animate --weight {CHARACTER}",
     "animate --style=old": f"unknown flag 'style'; did you mean --weight? it {CHARACTER}",

@@ -172,11 +172,9 @@ def _refuse_unknown_clips(names: Sequence[str]) -> None:
         return
     first_error, *_ = errors.values()
     _, *other_names = map(checks.preview, errors)
-    text, parenthesis, choices = str(first_error).partition(" (there are: ")
-    if not other_names or not parenthesis:
+    if not other_names:
         raise first_error
-    separator = " " if text.endswith("?") else "; "
-    raise ValueError(f"{text}{separator}not known either: {', '.join(other_names)}{parenthesis}{choices}")
+    raise ValueError(f"{first_error}; not known either: {', '.join(other_names)}")
 
 
 def _report_left_out(body: Body, names: Sequence[str], left_out: Mapping[str, str]) -> None:
