@@ -488,7 +488,7 @@ def test_lines_are_copied(served, tab):
     open_tab(tab, "Files")
     tab.get_by_role("button", name="Copy command").click()
     line = tab.evaluate("navigator.clipboard.readText()")
-    assert line == "arc-suite view --spec walker_8x2.json --task directed"
+    assert line == "arc-suite view --legs 8 --links 2 --task directed"
 
 
 def test_another_visitor_sees_the_same_creature(served, tab):
