@@ -27,6 +27,8 @@ CURES = {
 CURES_OF_OUTPUTS = {"format": "the extension of the output is its format"}
 # Values out of the range of a flag, which something else takes.
 CURES_OF_VALUES = {("legs", "3"): "a body of 3 legs is a spec, --spec=FILE"}
+# Numbers above the range of a flag, by its name.
+CURES_OF_LARGER_VALUES = {"seeds": "more seeds are a study of one's own, docs/study.md"}
 # Flags whose values a shell changes, unless they are quoted.
 CURES_OF_MISSING_VALUES = {"palette": "a shell drops what follows a #: quote the colors, --palette='#3a5f2b'"}
 
@@ -44,6 +46,7 @@ _CARD = "the card is README.md in the folder of the run"
 _CLIPS = "arc-suite animate writes clips, with --clips, --weight and --size"
 _TASK_OF_PAGE = "a page has the task of its policy"
 _WANDB = "Weights & Biases reads variables: WANDB_PROJECT, WANDB_ENTITY, WANDB_MODE, next to --wandb"
+_STUDY_OF_DIVISION = "arc-suite study DIVISION-ALGORITHM makes the same runs, and has --submit and --shard"
 _NO_BACKGROUND = "arc-suite animate --transparent writes a picture of a clip without a background"
 CURES_OF_PROGRAMS = {
     "animate": {
@@ -54,6 +57,8 @@ CURES_OF_PROGRAMS = {
     },
     "benchmark": {
         **dict.fromkeys(("tensorboard", "wandb"), _TRACKERS),
+        "steps": "a division has its steps; arc-suite train has --steps",
+        **dict.fromkeys(("hours", "partition", "shard", "submit"), _STUDY_OF_DIVISION),
         "robot": "--places takes robots with their tasks, such as tick-walk",
     },
     "build_model": dict.fromkeys(("ballast", "density", "mass"), _BALLAST),

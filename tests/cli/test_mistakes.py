@@ -309,6 +309,12 @@ WRONG_CURES = {
     "evaluate --robot=tick --json=a.csv": "unknown extension '.csv' (there are: .json)\n",
     "evaluate --seeds 0-9": "unknown flag 'seeds'; --episodes counts on from --seed: --seed=0 --episodes=10 are seeds",
     "animate --scale 2": "unknown flag 'scale'; --length NAME=FACTOR stretches links, and arc-suite ",
+    "benchmark samples --seeds 5": "flag --seeds=5: expected an integer in the range [1, 3]; more seeds are a study of "
+    "one's own, docs/study.md\n",
+    "benchmark samples --seeds 0": "flag --seeds=0: expected an integer in the range [1, 3]\n",
+    "benchmark samples --steps 9": "unknown flag 'steps'; a division has its steps; arc-suite train has --steps\n",
+    "benchmark samples --submit 2": "unknown flag 'submit'; arc-suite study DIVISION-ALGORITHM makes the same runs, and "
+    "has --submit and --shard\n",
     "benchmark --robot tick": "unknown flag 'robot'; --places takes robots with their tasks, such as tick-walk\n",
     "train --from RUN": "unknown flag 'from'; --algorithm finetune --hp start=RUN trains the policy of a run further\n",
     "design --robot tick": "unknown flag 'robot'; did you mean --around?\n",
