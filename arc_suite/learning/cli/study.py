@@ -14,6 +14,7 @@ or <division>-<algorithm> of the benchmark.
   arc-suite study samples-sac --device --minutes 30
 """
 
+import shutil
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -123,8 +124,10 @@ def submit(command: Sequence[str], jobs: int, folder: Path, results: Path) -> in
     """Submit a command that makes a study to a cluster, split into a number of jobs, and print them.
 
     Raises:
-        ValueError: submitit is not installed.
+        ValueError: the machine has no SLURM, or submitit is not installed.
     """
+    if shutil.which("sbatch") is None:
+        raise ValueError("--submit: SLURM's sbatch is not here; --jobs runs processes on this machine")
     with versions.require_extra("--submit needs submitit", "learn"):
         from arc_suite.learning.studies import cluster
     command = (*command, f"--runs={folder.absolute()}", f"--results={results.absolute()}")

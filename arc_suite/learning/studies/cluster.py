@@ -31,7 +31,7 @@ class Share(NamedTuple):
 
 
 def submit(
-    command: Sequence[str], shares: int, hours: float, logs: Path, cluster: str | None = None, **parameters
+    command: Sequence[str], shares: int, hours: float, logs: Path, cluster: str = "slurm", **parameters
 ) -> list[submitit.Job]:
     """Submit an array of jobs.
 
@@ -40,7 +40,7 @@ def submit(
         shares: number of jobs, of one core each.
         hours: time limit of a job, which is queued again.
         logs: folder of the jobs' output.
-        cluster: submitit's name of a cluster; None for the cluster of this machine.
+        cluster: submitit's name of what runs the jobs; "debug" and "local" run them on this machine.
         **parameters: others of submitit, such as `slurm_partition`.
     """
     executor = submitit.AutoExecutor(logs, cluster=cluster)

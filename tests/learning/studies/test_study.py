@@ -289,6 +289,14 @@ def test_a_study_is_found_in_the_current_folder(tmp_path):
     programs.refused(done, "arc-suite study: --shard=6/7: no run, as the study has 6\n")
 
 
+def test_a_study_is_submitted_where_slurm_is(tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    done = programs.run("-m", "arc_suite", "study", "top-ppo", "--submit=2", "--hours=1", cwd=tmp_path)
+    line = "--submit: SLURM's sbatch is not here; --jobs runs processes on this machine\n"
+    programs.refused(done, f"arc-suite study: {line}")
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_study_is_submitted_in_shares(tmp_path, monkeypatch):
     """By submitit's executor that runs jobs here; a job that is broken off comes back as it was."""
     pytest.importorskip("submitit", reason="of the extra cluster: make check-agents")
