@@ -47,8 +47,9 @@ def run(
         while names_to_start or processes:
             while names_to_start and len(processes) < jobs:
                 name = names_to_start.pop(0)
-                processes[name] = _start_process(commands[name](), log(logs, name))
-                say(f"{name}: running")
+                path = log(logs, name)
+                processes[name] = _start_process(commands[name](), path)
+                say(f"{name}: running, {path}")
             for name, process in list(processes.items()):
                 if process.poll() is None:
                     continue

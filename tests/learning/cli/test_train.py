@@ -174,7 +174,8 @@ def test_several_seeds(tmp_path):
     foreign.parent.mkdir(parents=True), foreign.write_text("")
     done = run("train", *CLIMB, "--seed=0,1,2", "--jobs=3", cwd=tmp_path)
     lines = done.stdout.splitlines()
-    assert done.returncode == 1 and lines[:3] == [f"{name}-{seed}: running" for seed in range(3)]
+    running_lines = [f"{name}-{seed}: running, runs/{name}-{seed}.log" for seed in range(3)]
+    assert done.returncode == 1 and lines[:3] == running_lines
     assert f"{name}-1: failed" in lines
     assert f"runs/{name}-1.log: arc-suite train: runs/{name}-1: no folder of a run, and not empty: " in done.stderr
     returns = [run_folder.table(tmp_path / "runs" / f"{name}-{seed}", "evaluations")["return"][-10:] for seed in (0, 2)]
