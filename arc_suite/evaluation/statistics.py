@@ -120,7 +120,7 @@ def difference_and_interval(
         The difference, and the ends of the interval; they are NaN if a stratum has fewer than `MIN_RUNS` runs.
 
     Raises:
-        ValueError: the strata are not as many, or one holds no value, or NaN.
+        ValueError: no strata, other numbers of them, or one holds no value, or NaN.
     """
     samples_x, samples_y = _sample_pairs(strata_x, strata_y)
     # The mean over all 2 n strata of X and of -Y is half of the mean difference.
@@ -179,7 +179,7 @@ def probability_of_improvement(strata_x, strata_y, seed: int = 0) -> tuple[float
         The probability, and the ends of the interval.
 
     Raises:
-        ValueError: the strata are not as many, or one holds no value, or NaN.
+        ValueError: no strata, other numbers of them, or one holds no value, or NaN.
     """
     random = np.random.default_rng(seed)
     pairs = list(zip(*_sample_pairs(strata_x, strata_y), strict=True))
@@ -242,6 +242,9 @@ def _sample_pairs(strata_x, strata_y) -> tuple[list[np.ndarray], list[np.ndarray
     """Return the values of the strata of X and of Y; see `_samples`."""
     if len(strata_x) != len(strata_y):
         raise ValueError(f"strata: expected as many of X as of Y, got {len(strata_x)} and {len(strata_y)}")
+    if not len(strata_x):
+        what = "the two learners have no place in common, or one of them has no scores"
+        raise ValueError(f"strata: expected at least one of X and of Y, got none; {what}")
     return _samples("strata_x", strata_x), _samples("strata_y", strata_y)
 
 

@@ -115,8 +115,18 @@ def test_strata_without_numbers_are_one_line(strata):
         lambda strata: evaluation.probability_of_improvement(strata, strata),
         lambda strata: evaluation.difference_and_interval(strata, strata),
     ):
-        with pytest.raises(ValueError, match=r"^strata(_x)?(\[[01]\])?: expected (at least one stratum|one number or)"):
+        with pytest.raises(ValueError, match=r"^strata(_x)?(\[[01]\])?: expected (at least one (stratum|of X)|one number or)"):
             figure(strata)
+
+
+def test_learners_without_a_common_place_are_one_line():
+    for figure in (evaluation.difference_and_interval, evaluation.probability_of_improvement):
+        with pytest.raises(ValueError) as caught:
+            figure([], [])
+        assert str(caught.value) == (
+            "strata: expected at least one of X and of Y, got none; the two learners have no place in common, or one "
+            "of them has no scores"
+        )
 
 
 @pytest.mark.parametrize("strata", [[[1.0]], [[1.0, 2.0]], [[1.0, 2.0, 3.0], [1.0, 2.0]]])
