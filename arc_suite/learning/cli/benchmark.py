@@ -20,6 +20,7 @@ from arc_suite import checks, evaluation, files
 from arc_suite.cli import outputs
 from arc_suite.cli.flags import refuse_flags
 from arc_suite.cli.program import progress, resumable, say
+from arc_suite.learning.agents import run_folder
 from arc_suite.learning.studies import benchmark, entries, publication, report, results, runner, tables
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS
 from arc_suite.simulation.cores import usable_cores
@@ -51,7 +52,10 @@ def main(division: str | None = None) -> int:
             score_policies(division)
         else:
             status = run_division(division, places)
-    print(benchmark.text(Path(FLAGS.results)))
+    results_folder = Path(FLAGS.results)
+    if status and not benchmark.read(results_folder):  # all runs have failed: lines above say why
+        return status
+    print(benchmark.text(results_folder))
     return status
 
 
@@ -73,7 +77,7 @@ def run_division(division: str, places: list[str]) -> int:
         places: places to run, ROBOT-TASK.
 
     Raises:
-        ValueError: an algorithm that the division does not take.
+        ValueError: an algorithm that the division does not take, or a run of more steps than it gives.
     """
     study = tables.benchmark(division, FLAGS.algorithm)
     learner = tables.folder_name(FLAGS.algorithm)
@@ -84,6 +88,8 @@ def run_division(division: str, places: list[str]) -> int:
     runs = [run for run in study.runs if _is_selected(run, places)]
     with resumable(folder):
         status = runner.make(runs, folder, FLAGS.jobs or usable_cores(), progress)
+    for run in runs:  # before their policies are judged
+        benchmark.check_steps(run, run_folder.read_progress(folder / run.name).get("evaluated", 0))
     publication.publish(study.runs, folder, published, progress)
     run_results = results.read_results(study.runs, published)
     if run_results:

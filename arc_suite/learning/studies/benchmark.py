@@ -17,6 +17,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.learning.studies import csv_files, results
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS, TURNING, place_setup
 from arc_suite.learning.studies.results import RunResult
+from arc_suite.learning.studies.tables import Run
 from arc_suite.learning.studies.text_tables import score_of_seeds, table
 
 SCORES = "scores.csv"
@@ -83,13 +84,8 @@ def _score_result(result: RunResult) -> RunScore:
     Raises:
         ValueError: the run has made more environment steps than its division gives.
     """
-    configuration = result.run.configuration
-    if result.steps[-1] > MAX_OVERRUN * configuration.steps:
-        raise ValueError(
-            f"run {result.run.name}: expected about {configuration.steps:,} environment steps, made "
-            f"{result.steps[-1]:,}; its learner must yield a slice at the latest where the next evaluation is due"
-        )
-    setup = configuration.setup
+    check_steps(result.run, int(result.steps[-1]))
+    setup = result.run.configuration.setup
     scale = results.anchors_of(result, result.curve_seeds)
     half = np.inf if scale is None else scale.at(HALF)
     reaching = np.flatnonzero(result.returns.mean(axis=1) >= half)
@@ -108,6 +104,21 @@ def _score_result(result: RunResult) -> RunScore:
         physics_sha256=result.physics_sha256,
         task_kwargs=settings_cell(setup),
     )
+
+
+def check_steps(run: Run, steps: int) -> None:
+    """Check the steps of a run against those of its division.
+
+    Raises:
+        ValueError: they are more than `MAX_OVERRUN` allows.
+    """
+    expected_steps = run.configuration.steps
+    max_steps = int(MAX_OVERRUN * expected_steps)
+    if steps > max_steps:
+        cure = "yield a slice at the latest at context.next_evaluation; steps of context.count_steps count, too"
+        raise ValueError(
+            f"run {run.name}: expected {expected_steps:,} steps, at most {max_steps:,}, made {steps:,}; {cure}"
+        )
 
 
 def settings_cell(setup: Setup) -> str:

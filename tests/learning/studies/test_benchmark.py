@@ -127,8 +127,8 @@ def test_a_run_of_more_steps_than_its_division_gives_has_no_score():
     with pytest.raises(ValueError) as caught:
         benchmark.score_results([result([0.0, 0.5], steps=(50_000, 200_000))])
     assert str(caught.value) == (
-        "run tick-walk-sac-0: expected about 100,000 environment steps, made 200,000; its learner must yield a slice "
-        "at the latest where the next evaluation is due"
+        "run tick-walk-sac-0: expected 100,000 steps, at most 105,000, made 200,000; yield a slice at the latest at "
+        "context.next_evaluation; steps of context.count_steps count, too"
     )
 
 
@@ -403,6 +403,35 @@ def test_policies_of_others_are_scored(tmp_path):
     first_line = "theirs: 1 of the 30 policies of an entry, 100 episodes each"
     assert done.stdout == f"{first_line}\n{benchmark.text(tmp_path / 'studies')}\n"
     assert row(done.stdout, "theirs")[4:6] == ["tick walk 1.01", "-"]  # the lowest place, and minutes that nobody knows
+
+
+FAILING = """
+import dataclasses
+
+import arc_suite
+from arc_suite.learning.agents.algorithms import Algorithm
+
+@dataclasses.dataclass(frozen=True)
+class Settings:
+    rate: float = 0.1
+
+def learn(hp, context):
+    raise ValueError("nothing to learn")
+
+fail = Algorithm(learn, Settings(), "fails", source="nothing")
+arc_suite.register(module=__name__, algorithms={"fail": fail})
+"""
+
+
+@pytest.mark.slow
+def test_a_failed_run_has_the_last_line(tmp_path):
+    (tmp_path / "failing.py").write_text(FAILING)
+    done = run("samples", "--algorithm=failing:fail", "--places=tick-walk", "--seeds=1", "--jobs=1", cwd=tmp_path)
+    assert done.returncode == 1 and done.stdout.endswith("0 of 1 finished, 1 failed\n")
+    log = "runs/samples-failing.fail/tick-walk-failing.fail-0.log"
+    assert f"tick-walk-failing.fail-0: running, {log}\n" in done.stdout
+    last_line = done.stderr.splitlines()[-1]
+    assert last_line.startswith(f"{log}: ") and "nothing to learn" in last_line
 
 
 SHORT = """
