@@ -313,8 +313,8 @@ WRONG_CURES = {
     "one's own, docs/study.md\n",
     "benchmark samples --seeds 0": "flag --seeds=0: expected an integer in the range [1, 3]\n",
     "benchmark samples --steps 9": "unknown flag 'steps'; a division has its steps; arc-suite train has --steps\n",
-    "benchmark samples --submit 2": "unknown flag 'submit'; arc-suite study DIVISION-ALGORITHM makes the same runs, and "
-    "has --submit and --shard\n",
+    "benchmark samples --submit 2": "unknown flag 'submit'; arc-suite study DIVISION-ALGORITHM makes the same runs, "
+    "and has --submit and --shard\n",
     "benchmark --robot tick": "unknown flag 'robot'; --places takes robots with their tasks, such as tick-walk\n",
     "train --from RUN": "unknown flag 'from'; --algorithm finetune --hp start=RUN trains the policy of a run further\n",
     "design --robot tick": "unknown flag 'robot'; did you mean --around?\n",

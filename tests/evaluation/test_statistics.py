@@ -108,6 +108,7 @@ def test_a_difference_has_the_interval_of_welch():
     "strata", [[], [[]], [[1.0], [np.nan, 2.0]], [[1.0], 2.0]], ids=["none", "empty", "nan", "flat"]
 )
 def test_strata_without_numbers_are_one_line(strata):
+    line = r"^strata(_x)?(\[[01]\])?: expected (at least one (stratum|of X)|one number or)"
     for figure in (
         evaluation.mean_and_interval,
         evaluation.iqm_and_interval,
@@ -115,7 +116,7 @@ def test_strata_without_numbers_are_one_line(strata):
         lambda strata: evaluation.probability_of_improvement(strata, strata),
         lambda strata: evaluation.difference_and_interval(strata, strata),
     ):
-        with pytest.raises(ValueError, match=r"^strata(_x)?(\[[01]\])?: expected (at least one (stratum|of X)|one number or)"):
+        with pytest.raises(ValueError, match=line):
             figure(strata)
 
 
