@@ -54,6 +54,8 @@ def register(
     networks: Mapping[str, Any] | None = None,
     algorithms: Mapping[str, Any] | None = None,
     clips: Mapping[str, Any] | None = None,
+    goals: Mapping[str, Any] | None = None,
+    axes: Mapping[str, Any] | None = None,
     programs: Mapping[str, str] | None = None,
     **others: Any,
 ) -> None:
@@ -85,12 +87,14 @@ def register(
             `learning.agents.architectures.of`.
         algorithms: values of `learning.agents.algorithms.Algorithm` by name.
         clips: values of classes of `animation.clips.catalog`, such as `Acted`, by name.
+        goals: values of `animation.design.trials.Goal` by name, for `arc-suite design --goal`.
+        axes: values of `animation.design.axes.Axis` by name, for `arc-suite design --map`.
         programs: names of modules that `arc-suite` runs, by name of the program. Each module has a docstring and a
             function `main`.
         others: none; an unknown argument is refused with what takes its place.
 
-    A network, an algorithm or a clip may also be a text `module:attribute`: it is then imported and checked at its
-    first use.
+    A network, an algorithm, a clip, a goal or an axis may also be a text `module:attribute`: it is then imported and
+    checked at its first use.
 
     Raises:
         ValueError: a name that is taken, a task or a law that lacks methods, or parameters or a preset that do not fit
@@ -104,7 +108,15 @@ def register(
         module = None
     _check_tables(tasks=tasks, modifiers=modifiers)
     _check_tables(arenas=arenas, families=families, laws=laws, networks=networks)
-    _check_tables(algorithms=algorithms, clips=clips, programs=programs, presets=presets, parameters=parameters)
+    _check_tables(
+        algorithms=algorithms,
+        clips=clips,
+        goals=goals,
+        axes=axes,
+        programs=programs,
+        presets=presets,
+        parameters=parameters,
+    )
     all_additions = {
         "task": {_task_name(task): task for task in tasks},
         "arena": arenas,
@@ -114,6 +126,8 @@ def register(
         "network": networks,
         "algorithm": algorithms,
         "clip": clips,
+        "goal": goals,
+        "axis": axes,
         "program": programs,
     }
     additions_by_kind = {kind: dict(additions) for kind, additions in all_additions.items() if additions}
@@ -135,7 +149,7 @@ def register(
     elif not (parameters is None and presets is None and visuals is None):
         raise ValueError("parameters, presets and visuals belong to a body, and none is given")
     elif not additions_by_kind:
-        kinds = "a body, tasks, arenas, families, modifiers, laws, networks, algorithms, clips or programs"
+        kinds = "a body, tasks, arenas, families, modifiers, laws, networks, algorithms, clips, goals, axes or programs"
         raise ValueError(f"nothing to register: give {kinds}")
 
     LAWS.update(law_by_preset_class)

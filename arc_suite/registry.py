@@ -1,7 +1,7 @@
 """Tables of names: robots, families of bodies, tasks and arenas, including those of other packages.
 
-Other packages also register laws, networks, algorithms, clips and programs. The tables here contain only those
-additions: the suite's own entries of these kinds stand in the modules that use them.
+Other packages also register laws, networks, algorithms, clips, goals and axes of a search, and programs. The tables
+here contain only those additions: the suite's own entries of these kinds stand in the modules that use them.
 """
 
 import collections
@@ -48,7 +48,9 @@ REFUSAL_OF_ONE_BODY = "arc_suite.bodies.environments:refuse_one_environment"
 
 # Values that other packages register, or texts `module:attribute` for `resolve`, by kind and name. The module that uses
 # a kind has a table of the suite's own values, and checks all values when it uses them; see `find`.
-ADDITIONS: dict[str, dict[str, Any]] = {"law": {}, "network": {}, "algorithm": {}, "clip": {}, "program": {}}
+ADDITIONS: dict[str, dict[str, Any]] = {
+    kind: {} for kind in ("law", "network", "algorithm", "clip", "goal", "axis", "program")
+}
 
 # (kind, name) of what other packages register -> the module whose import registers it.
 MODULE_OF_NAME = {}

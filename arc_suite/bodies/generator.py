@@ -257,19 +257,23 @@ def mutated(body: Body, seed: int, amount: float = 0.1) -> Body:
     """
     random = np.random.default_rng(checks.seed(seed))
     amount = checks.number("amount", amount, 0.0, 0.5)
-    changes = amount * random.standard_normal(deformation_count(body))
+    changes = amount * random.standard_normal(len(list_deformations(body)))
     return deform_legs(body, changes)
 
 
-def deformation_count(body: Body) -> int:
-    """Return how many changes `deform_legs` takes.
+def list_deformations(body: Body) -> tuple[str, ...]:
+    """Return what `deform_legs` changes, by names such as l1_upper for a length and l1_heading for a heading.
 
-    Each leg together with its mirror images takes one for each link, and one more; of imported bodies only links with
-    a length of their own count.
+    A leg has its name, and stands for its mirror images, too. Of imported bodies only links with a length of their own
+    change.
     """
     if body.source:
-        return imported_variants.count_changes(body)
-    return sum(len(leg.links) + 1 for leg, _ in _legs_with_images(body))
+        return imported_variants.list_changes(body)
+    names = []
+    for leg, _ in _legs_with_images(body):
+        names += [leg.full_name(link) for link in leg.links]
+        names.append(f"{leg.name}_heading")
+    return tuple(names)
 
 
 def deform_legs(body: Body, changes: np.ndarray) -> Body:
@@ -277,8 +281,8 @@ def deform_legs(body: Body, changes: np.ndarray) -> Body:
 
     Args:
         body: body to change.
-        changes: (deformations,) for each of these legs the logarithm of the factor of each link, and the turn of the
-            leg about the vertical, rad. Legs of imported bodies do not turn; see `imported_variants`.
+        changes: (deformations,) in the order of `list_deformations`: the logarithm of the factor of a length, or the
+            turn of a leg about the vertical, rad. Legs of imported bodies do not turn; see `imported_variants`.
 
     Returns:
         The body, `<name>_mutated`, to be sized anew; an imported body keeps its motors.

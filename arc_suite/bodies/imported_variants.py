@@ -10,9 +10,9 @@ from arc_suite.robots.spec import Body, Leg
 _SAME_PLACE = 0.01  # standing heights; legs of a file are mirror images up to this distance
 
 
-def count_changes(body: Body) -> int:
-    """Return how many changes `deform_imported_legs` takes: one for each link with a length, of legs that are alike."""
-    return sum(len(parts) for _, parts in _groups_of_legs(body))
+def list_changes(body: Body) -> tuple[str, ...]:
+    """Return what `deform_imported_legs` changes: links with a length, each the first of those that are alike."""
+    return tuple(legs[0].part_names[part] for legs, parts in _groups_of_legs(body) for part in parts)
 
 
 def deform_imported_legs(body: Body, changes: np.ndarray) -> Body:
@@ -23,7 +23,7 @@ def deform_imported_legs(body: Body, changes: np.ndarray) -> Body:
 
     Args:
         body: with a source.
-        changes: (deformations,) logarithms of the factors of links; see `count_changes`.
+        changes: (deformations,) logarithms of the factors of links; see `list_changes`.
 
     Raises:
         ValueError: a length grown out of range.

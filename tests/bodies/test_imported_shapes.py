@@ -226,7 +226,7 @@ def test_a_changed_robot_stands_and_walks(links):
 
 @by_name
 def test_variants_keep_feet_level_motors_and_torso(body):
-    count = generator.deformation_count(body)
+    count = len(generator.list_deformations(body))
     assert bool(count) == bool(parts_with_lengths(body))
     if not count:
         return

@@ -282,7 +282,7 @@ class Misnamed(Walk):
         (
             {},
             "nothing to register: give a body, tasks, arenas, families, modifiers, laws, networks, "
-            "algorithms, clips or programs",
+            "algorithms, clips, goals, axes or programs",
         ),
         ({"parameters": {"walk": ROW}}, "parameters, presets and visuals belong to a body, and none is given"),
         ({"body": "other"}, "body: expected a spec.Body, got 'other'"),

@@ -14,17 +14,17 @@ from interpreters import ROOT, printed
 from packaging.requirements import Requirement
 
 GUIDE = (ROOT / "docs" / "doors.md").read_text()
-SHUFFLING, USING_A_LAW, GALES, USING_A_MODIFIER, _, GESTURING, JOINT_COUNTER, MEASURING = re.findall(
+SHUFFLING, USING_A_LAW, GALES, USING_A_MODIFIER, _, GESTURING, THRIFTY, JOINT_COUNTER, MEASURING = re.findall(
     r"```python\n(.*?)```", GUIDE, re.DOTALL
 )
-EVALUATE, COLLECT, _, _, ANIMATE, COUNT, _ = re.findall(r"^arc-suite .*$", GUIDE, re.MULTILINE)
+EVALUATE, COLLECT, _, _, ANIMATE, DESIGN, COUNT, _ = re.findall(r"^arc-suite .*$", GUIDE, re.MULTILINE)
 ENTRY_POINT, PYPROJECT = re.findall(r"```toml\n(.*?)```", GUIDE, re.DOTALL)
 
 
 @pytest.fixture
 def folder(tmp_path):
     """Write the guide's files, and return their folder."""
-    files = {"shuffling": SHUFFLING, "gales": GALES, "gesturing": GESTURING}
+    files = {"shuffling": SHUFFLING, "gales": GALES, "gesturing": GESTURING, "thrifty": THRIFTY}
     files |= {"joint_counter": JOINT_COUNTER, "measuring": MEASURING}
     for name, text in files.items():
         (tmp_path / f"{name}.py").write_text(text)
@@ -157,6 +157,20 @@ def test_clips_are_animated(run, folder):
     found = json.loads((folder / "queen.clips.json").read_text())
     named = found["clips"]
     assert named["creep_loop"]["forward_speed"] < 0.5 * named["walk_loop"]["forward_speed"]
+
+
+@pytest.mark.slow
+def test_bodies_are_searched_for_a_goal_along_an_axis(run, folder):
+    done = run(DESIGN, "--bodies=20", "--steps=30", "--nopages", "--processes=1")
+    _, header, *rows, _ = programs.passed(done).splitlines()
+    assert "speed by power, (m/s)/(W/kg)" in header and all("_stretch" in row.split()[0] for row in rows)
+    report = json.loads((folder / "thrifty" / "design.json").read_text())
+    best = report["elites"][0]
+    assert report["goal"] == "thrifty:thrift" and report["map"]["names"] == ["legs", "thrifty:stretch"]
+    assert f"{best['second']['speed'] / best['second']['power']:.3f}" in rows[0]
+    done = run(DESIGN.replace(":thrift ", ":thrit "))
+    line = "goal 'thrit': thrifty registers no such goal by arc_suite.register; did you mean 'thrift'?\n"
+    programs.refused(done, f"arc-suite design: {line}")
 
 
 def test_a_program_runs_by_its_module(run):

@@ -28,7 +28,7 @@ from arc_suite.animation.design import axes, gallery
 from arc_suite.animation.design.axes import Map
 from arc_suite.animation.design.genes import Budget, ProportionGenes, VariantGenes, extent
 from arc_suite.animation.design.search import BATCH_SIZE, RANDOM_BODIES, Candidates, Search
-from arc_suite.animation.design.trials import GOALS, Outcome, Trial, evaluate, measure_walk
+from arc_suite.animation.design.trials import GOALS, Outcome, Trial, evaluate, goal_of, measure_walk
 from arc_suite.cli import outputs
 from arc_suite.cli.flags import MAX_COUNT, ROBOT_HELP, named_values, refuse_flags
 from arc_suite.cli.program import progress, resumable, say
@@ -49,7 +49,7 @@ _BUDGET_BOUNDS = {
 _MAX_STEM = MAX_NAME - 7  # characters of a creature's name in the names of its variants, before _ and a number
 
 FLAGS = flags.FLAGS
-flags.DEFINE_string("goal", "transport", f"{', '.join(GOALS)}; docs/design.md describes them.")
+flags.DEFINE_string("goal", "transport", f"{', '.join(GOALS)}, or module:name; docs/design.md describes them.")
 flags.DEFINE_string("task", None, "Task in which bodies are evaluated. [default: that of the goal]")
 flags.DEFINE_multi_string("set", [], "Setting of the task, name=value.")
 flags.DEFINE_string("around", None, f"A creature whose variants are searched: {ROBOT_HELP}, or a spec file.")
@@ -194,7 +194,7 @@ def main() -> None:
     if not FLAGS.output:
         raise ValueError("no folder to write to; say --output=FOLDER")
     outputs.check_folders("output")
-    goal = GOALS[checks.name(FLAGS.goal, GOALS, "goal")]
+    goal = goal_of(FLAGS.goal)
     around = None if FLAGS.around is None else registry.body_of(FLAGS.around)
     if around is None:
         refuse_flags(["amount"], "goes with --around")
@@ -258,22 +258,21 @@ def check_one_step(trial: Trial, body: Body | str) -> None:
     """
     if isinstance(body, str):
         raise ValueError(body)
-    goal = GOALS[trial.goal]
-    measure_walk(body, trial.task, trial.first._replace(steps=1), goal)
-    second_walk = measure_walk(body, trial.task, trial.second._replace(steps=1), goal)
+    goal = goal_of(trial.goal)
+    measure_walk(body, trial.task, trial.first._replace(steps=1), goal.preset)
+    second_walk = measure_walk(body, trial.task, trial.second._replace(steps=1), goal.preset)
     if math.isnan(goal.value(second_walk)):
         raise ValueError(f"--goal={trial.goal}: task {trial.task} does not measure {goal.metric}")
 
 
 def print_table(elites: Iterable[gallery.Elite], trial: Trial) -> None:
     """Print a row for each cell: its body, and the metric in both evaluations."""
-    goal = GOALS[trial.goal]
-    metric = goal.metric
+    goal = goal_of(trial.goal)
     unit = goal.unit.replace(" ", ", ")
     line = "{:<24} {:>6} {:>17} {:>15} {:>12}"
     print(line.format("cell", "body", f"{goal.metric_text}{unit}", "evaluated again", "power, W/kg"))
     for elite in elites:
-        first = f"{getattr(elite.first, metric):.3f}"
-        second = f"{getattr(elite.second, metric):.3f}"
+        first = f"{goal.measure_metric(elite.first):.3f}"
+        second = f"{goal.measure_metric(elite.second):.3f}"
         power = f"{elite.second.power:.1f}"
         print(line.format(elite.label, elite.number, first, second, power))

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import checks
+from arc_suite import checks, registry
 from arc_suite.animation.design.genes import extent
 from arc_suite.robots.spec import Body
 
@@ -48,15 +48,27 @@ AXES: Mapping[str, Axis] = {
     "height": Axis(_relative_height, (0.33, 0.37, 0.41, 0.47)),
     "width": Axis(_relative_width, (0.92, 1.0, 1.02, 1.07)),
 }
-HELP = "legs, links: their numbers; height, width: over the length, in five bins"
+HELP = "legs, links: their numbers; height, width: over the length, in five bins; or module:name"
 VARIANT_EDGES = (-0.75, -0.25, 0.25, 0.75)  # of the bins around a body, standard deviations of its variants
+
+
+def axis_of(name: str) -> Axis:
+    """Return the axis of a name, or of `module:name`, which another package registers.
+
+    Raises:
+        ValueError: an unknown name, or no axis.
+    """
+    axis = registry.find("axis", name, AXES)
+    if not isinstance(axis, Axis):
+        raise ValueError(f"axis {registry.bare_name(name)!r}: expected an Axis, got {checks.preview(axis)}")
+    return axis
 
 
 class Map(NamedTuple):
     """Cells of bodies.
 
     Attributes:
-        names: names of the axes.
+        names: names of the axes; see `axis_of`.
         edges: edges of the bins by axis; None for counts.
     """
 
@@ -75,28 +87,28 @@ class Map(NamedTuple):
         Raises:
             ValueError: an unknown axis, a repeated one, or more than two.
         """
-        names = tuple(checks.name(name, AXES, "axis") for name in names)
+        axes = [axis_of(name) for name in names]
         if len(names) not in (1, 2) or len(set(names)) < len(names):
             raise ValueError(f"map: expected one or two different axes of {', '.join(AXES)}, got {','.join(names)}")
-        edges = tuple(_bin_edges(AXES[name], around, amount) for name in names)
-        return cls(names, edges)
+        edges = tuple(_bin_edges(axis, around, amount) for axis in axes)
+        return cls(tuple(names), edges)
 
     def cell(self, body: Body) -> tuple[int, ...]:
         """Return the bin of a body on each axis: its count, or the number of its bin, from 1."""
         cell = []
         for name, edges in zip(self.names, self.edges, strict=True):
-            value = AXES[name].measure(body)
+            value = axis_of(name).measure(body)
             cell.append(int(value) if edges is None else 1 + int(np.searchsorted(edges, value)))
         return tuple(cell)
 
     def label(self, cell: Sequence[int]) -> str:
         """Return the name of a cell's files, such as legs6_links3."""
-        return "_".join(f"{name}{number}" for name, number in zip(self.names, cell, strict=True))
+        return "_".join(f"{registry.bare_name(name)}{number}" for name, number in zip(self.names, cell, strict=True))
 
     def describe(self, cell: Sequence[int]) -> str:
         """Return a cell in words, such as "6 legs, 3 links" or "height 2 of 5, width 4 of 5"."""
         texts = []
-        for name, edges, number in zip(self.names, self.edges, cell, strict=True):
+        for name, edges, number in zip(map(registry.bare_name, self.names), self.edges, cell, strict=True):
             texts.append(f"{number} {name}" if edges is None else f"{name} {number} of {len(edges) + 1}")
         return ", ".join(texts)
 

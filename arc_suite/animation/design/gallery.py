@@ -19,7 +19,7 @@ from arc_suite import files, policies, style
 from arc_suite.animation import pages
 from arc_suite.animation.design.axes import Map
 from arc_suite.animation.design.search import Search
-from arc_suite.animation.design.trials import GOALS, Trial, WalkMeans, open_walk
+from arc_suite.animation.design.trials import Goal, Trial, WalkMeans, goal_of, open_walk
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_to_json
 from arc_suite.simulation import films
@@ -108,10 +108,10 @@ def write_specs(folder: Path, elites: Iterable[Elite]) -> None:
         files.write(folder / f"{elite.label}.json", body_to_json(elite.body))
 
 
-def caption(elite: Elite, cell_map: Map, goal: str) -> str:
+def caption(elite: Elite, cell_map: Map, goal: Goal) -> str:
     """Return the cell of an elite, and its metric in its second evaluation."""
-    value = getattr(elite.second, GOALS[goal].metric)
-    return f"{cell_map.describe(elite.cell)}: {GOALS[goal].metric_text} {value:.3g}{GOALS[goal].unit}"
+    value = goal.measure_metric(elite.second)
+    return f"{cell_map.describe(elite.cell)}: {goal.metric_text} {value:.3g}{goal.unit}"
 
 
 def draw_pictures(elites: Iterable[Elite], cell_map: Map, trial: Trial) -> dict[Cell, np.ndarray]:
@@ -120,15 +120,16 @@ def draw_pictures(elites: Iterable[Elite], cell_map: Map, trial: Trial) -> dict[
     Raises:
         RenderingUnavailable: no OpenGL here.
     """
+    goal = goal_of(trial.goal)
     pictures = {}
     for elite in elites:
-        environment, policy = open_walk(elite.body, trial.task, trial.first, GOALS[trial.goal])
+        environment, policy = open_walk(elite.body, trial.task, trial.first, goal.preset)
         act = policies.alone(policy, trial.first.seeds[0])  # a function of a `TimeStep`
         size = (_PICTURE_WIDTH, _PICTURE_HEIGHT)
         footage = films.Footage(elite.label, environment, act, "portrait", size)
         for _ in range(_PICTURE_STEP):
             footage.step()
-        pictures[elite.cell] = films.add_caption(footage.view(), caption(elite, cell_map, trial.goal))
+        pictures[elite.cell] = films.add_caption(footage.view(), caption(elite, cell_map, goal))
         footage.close()
     return pictures
 
@@ -149,11 +150,12 @@ def write_walks(folder: Path, elites: Iterable[Elite], cell_map: Map, trial: Tri
         ValueError: the viewer has not been built.
     """
     files.folder(folder)
+    goal = goal_of(trial.goal)
     for elite in elites:
-        environment, policy = open_walk(elite.body, trial.task, trial.first, GOALS[trial.goal])
+        environment, policy = open_walk(elite.body, trial.task, trial.first, goal.preset)
         track = style.record(environment, policy, seed=trial.first.seeds[0], max_steps=WALK_STEPS)
         environment.close()
-        page = pages.page({caption(elite, cell_map, trial.goal): track})
+        page = pages.page({caption(elite, cell_map, goal): track})
         files.write(folder / f"{elite.label}.html", page)
 
 

@@ -119,11 +119,11 @@ class VariantGenes:
         Raises:
             ValueError: an imported body without a link that can change.
         """
-        if not generator.deformation_count(body):
+        self.names = generator.list_deformations(body)
+        if not self.names:
             raise ValueError(f"{body.name}: no link has a length that can change; loops close between them")
         self._body = body
         self._amount = amount
-        self.names = tuple(f"deformation_{number}" for number in range(1, generator.deformation_count(body) + 1))
 
     def shape(self, genes: np.ndarray) -> Body:
         """Return the variant of genes (n,) from 0 to 1; genes of 0.5 leave the body as it is."""

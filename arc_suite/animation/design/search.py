@@ -16,7 +16,7 @@ import numpy as np
 
 from arc_suite.animation.design.axes import Map
 from arc_suite.animation.design.genes import Genes, body_within_budget
-from arc_suite.animation.design.trials import GOALS, Outcome, Trial, WalkMeans
+from arc_suite.animation.design.trials import Outcome, Trial, WalkMeans, goal_of
 from arc_suite.robots.spec import Body
 
 BATCH_SIZE = 20  # bodies
@@ -127,7 +127,7 @@ class Search:
 
     def add(self, batch: Candidates) -> None:
         """Add evaluated bodies: a body whose second evaluation exceeds that of its cell's elite becomes the elite."""
-        goal = GOALS[self._trial.goal]
+        goal = goal_of(self._trial.goal)
         for candidate in batch.candidates:
             may_be_elite = not candidate.outcome.reason and candidate.outcome.second is not None
             if may_be_elite and goal.value(candidate.outcome.second) > self._elite_value(candidate.cell):
@@ -166,4 +166,4 @@ class Search:
         if cell not in self.elites:
             return -np.inf
         elite = self.candidates[self.elites[cell]]
-        return GOALS[self._trial.goal].value(elite.outcome.second)
+        return goal_of(self._trial.goal).value(elite.outcome.second)

@@ -1,7 +1,7 @@
 """Evaluation of bodies: a fitted demonstrator walks each body, and a goal says what the walk is worth."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -46,12 +46,13 @@ class Goal(NamedTuple):
     """What bodies are searched for.
 
     Attributes:
-        metric: metric of a walk, a field of `WalkMeans`.
+        metric: name of the metric of a walk; a field of `WalkMeans` unless there is `measure`.
         sign: 1 for a metric to be raised, -1 for a metric to be lowered.
         task: name of the default task.
         preset: preset of the demonstrator; None for the one that suits task and body.
         may_fall: whether a fall lowers the metric only, and does not exclude the body.
         unit: unit of the metric.
+        measure: returns the metric of a walk; None for the field of `WalkMeans` that `metric` names.
     """
 
     metric: str
@@ -60,15 +61,29 @@ class Goal(NamedTuple):
     preset: str | None = None
     may_fall: bool = False
     unit: str = ""
+    measure: Callable[[WalkMeans], float] | None = None
 
     @property
     def metric_text(self) -> str:
         """Return the metric in words."""
         return self.metric.replace("_", " ")
 
+    def measure_metric(self, walk: WalkMeans) -> float:
+        """Return the metric of a walk.
+
+        Raises:
+            ValueError: `measure` returns no number, or divides by zero.
+        """
+        if self.measure is None:
+            return getattr(walk, self.metric)
+        try:
+            return float(self.measure(walk))
+        except (TypeError, ZeroDivisionError) as error:
+            raise ValueError(f"metric {self.metric}: {error}") from None
+
     def value(self, walk: WalkMeans) -> float:
-        """Return the metric of a walk as a number to be raised."""
-        return self.sign * getattr(walk, self.metric)
+        """Return the metric of a walk as a number to be raised; see `measure_metric`."""
+        return self.sign * self.measure_metric(walk)
 
 
 GOALS: Mapping[str, Goal] = {
@@ -78,6 +93,18 @@ GOALS: Mapping[str, Goal] = {
     "tracking": Goal("tracking", 1.0, "steer"),
     "robustness": Goal("tracking", 1.0, "shoved", may_fall=True),
 }
+
+
+def goal_of(name: str) -> Goal:
+    """Return the goal of a name, or of `module:name`, which another package registers.
+
+    Raises:
+        ValueError: an unknown name, or no goal.
+    """
+    goal = registry.find("goal", name, GOALS)
+    if not isinstance(goal, Goal):
+        raise ValueError(f"goal {registry.bare_name(name)!r}: expected a Goal, got {checks.preview(goal)}")
+    return goal
 
 
 class Round(NamedTuple):
@@ -99,7 +126,7 @@ class Trial(NamedTuple):
 
     Attributes:
         task: its name.
-        goal: a name of `GOALS`.
+        goal: its name; see `goal_of`.
         budget: budget that the body keeps.
         first: episodes of all bodies.
         second: episodes of the bodies that challenge the elite of their cell.
@@ -153,13 +180,13 @@ def evaluate(trial: Trial, body: Body | str, elite_value: float) -> Outcome:
     body_flaws = flaws(body)
     if body_flaws:
         return Outcome(f"unsound: {body_flaws[0].text}")
-    goal = GOALS[trial.goal]
+    goal = goal_of(trial.goal)
     try:
-        first = measure_walk(body, trial.task, trial.first, goal)
+        first = measure_walk(body, trial.task, trial.first, goal.preset)
         first_reason = exclusion_reason(goal, trial.budget, first)
         if first_reason or goal.value(first) <= elite_value:
             return Outcome(first_reason, first)
-        second = measure_walk(body, trial.task, trial.second, goal)
+        second = measure_walk(body, trial.task, trial.second, goal.preset)
     except ValueError as error:
         return Outcome(f"refused: {error}")
     second_reason = exclusion_reason(goal, trial.budget, second)
@@ -179,13 +206,19 @@ def exclusion_reason(goal: Goal, budget: Budget, walk: WalkMeans) -> str:
     return ""
 
 
-def measure_walk(body: Body, task: str, episodes: Round, goal: Goal) -> WalkMeans:
+def measure_walk(body: Body, task: str, episodes: Round, preset: str | None = None) -> WalkMeans:
     """Let the demonstrator walk a body and return means over the episodes.
+
+    Args:
+        body: any body.
+        task: name of the task.
+        episodes: settings, seeds and control steps of the episodes.
+        preset: preset of the demonstrator; None for the one that suits task and body.
 
     Raises:
         ValueError: a setting that does not fit, or a body that no demonstrator walks.
     """
-    environment, policy = open_walk(body, task, episodes, goal)
+    environment, policy = open_walk(body, task, episodes, preset)
     try:
         walks = [_walk_episode(environment, policy, seed, episodes.steps) for seed in episodes.seeds]
     finally:
@@ -194,7 +227,7 @@ def measure_walk(body: Body, task: str, episodes: Round, goal: Goal) -> WalkMean
     return WalkMeans(*means.tolist())
 
 
-def open_walk(body: Body, task: str, episodes: Round, goal: Goal) -> tuple[Environment, Policy]:
+def open_walk(body: Body, task: str, episodes: Round, preset: str | None) -> tuple[Environment, Policy]:
     """Open an environment of a body, fit the demonstrator, and return both.
 
     Raises:
@@ -202,7 +235,7 @@ def open_walk(body: Body, task: str, episodes: Round, goal: Goal) -> tuple[Envir
     """
     settings = {**episodes.settings, **_DIVERGENCE_SETTINGS}
     environment = Setup.of(body, task, settings).load(episodes.seeds[0])
-    policy = policies.policy("cpg", body, goal.preset, task=environment.task.definition)
+    policy = policies.policy("cpg", body, preset, task=environment.task.definition)
     return environment, policy
 
 

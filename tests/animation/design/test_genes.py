@@ -9,7 +9,7 @@ import sprung_robots
 
 from arc_suite.animation.design.axes import AXES, Map
 from arc_suite.animation.design.genes import Budget, ProportionGenes, VariantGenes, body_within_budget, extent
-from arc_suite.bodies.generator import deformation_count, mutated, random_body
+from arc_suite.bodies.generator import list_deformations, mutated, random_body
 from arc_suite.importing import import_robot
 from arc_suite.models.soundness import flaws
 from arc_suite.models.standing import measure_standing
@@ -59,7 +59,7 @@ def test_a_bound_on_the_height_is_kept():
 def test_variants_differ_are_no_larger_and_in_the_middle_are_the_creature():
     tick = ROBOTS["tick"]
     budget = Budget(measure_standing(tick).mass, float(extent(tick).max()))
-    body = body_within_budget(budget, VariantGenes(tick, 0.1), np.full(deformation_count(tick), 0.5), "tick_0")
+    body = body_within_budget(budget, VariantGenes(tick, 0.1), np.full(len(list_deformations(tick)), 0.5), "tick_0")
     plain = mutated(tick, 0, amount=0.0)
     assert body.replace(name=plain.name, density=plain.density) == plain
     assert math.isclose(body.density, tick.density, rel_tol=1e-9)

@@ -9,7 +9,7 @@ from arc_suite.animation.design import gallery
 from arc_suite.animation.design.axes import Map
 from arc_suite.animation.design.genes import Budget, ProportionGenes
 from arc_suite.animation.design.search import BATCH_SIZE, RANDOM_BODIES, Candidates, Search
-from arc_suite.animation.design.trials import Outcome, Round, Trial, WalkMeans
+from arc_suite.animation.design.trials import GOALS, Outcome, Round, Trial, WalkMeans
 from arc_suite.robots import ROBOTS
 
 ROUND = Round({}, (0,), 10)
@@ -42,7 +42,7 @@ def evaluated(jobs):
 def test_a_picture_names_cell_and_metric(axes, cell, goal, text):
     walk = WalkMeans(speed=0.25, achieved=1.0, tracking=0.75, cost_of_transport=1.5, power=5.0, falls=0.0)
     elite = gallery.Elite("label", cell, 0, ROBOTS["tick"], walk, walk)
-    assert gallery.caption(elite, Map.of(axes), goal) == text
+    assert gallery.caption(elite, Map.of(axes), GOALS[goal]) == text
 
 
 @functools.cache

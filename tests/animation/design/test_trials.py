@@ -5,6 +5,7 @@ import math
 import imports
 import pytest
 
+from arc_suite.animation.design import trials
 from arc_suite.animation.design.genes import Budget
 from arc_suite.animation.design.trials import GOALS, Round, Trial, WalkMeans, evaluate, exclusion_reason, measure_walk
 from arc_suite.bodies.generator import generate
@@ -33,6 +34,16 @@ def test_goals_are_raised_or_lowered():
     assert GOALS["transport"].value(GOOD) == -1.5 and GOALS["speed"].value(GOOD) == 0.5
 
 
+@pytest.mark.parametrize(
+    ("measure", "message"),
+    [(lambda walk: walk.speed / 0, "division by zero"), (lambda walk: None, "must be a string or a real number")],
+)
+def test_a_metric_that_is_no_number_is_one_line(measure, message):
+    goal = trials.Goal("thrift", 1.0, "walk", measure=measure)
+    with pytest.raises(ValueError, match=f"^metric thrift: [^\\n]*{message}"):
+        goal.value(GOOD)
+
+
 def test_the_second_evaluation_is_longer_on_other_seeds_and_ground():
     trial = Trial.of("stairs", {"rise": 0.1, "terrain_seed": 4}, "progress", BUDGET, 100)
     assert trial.first == ({"rise": 0.1, "terrain_seed": 4}, (0,), 100)
@@ -57,13 +68,13 @@ def test_a_body_walks_and_challenges_an_elite():
 
 def test_the_power_of_servos_is_that_of_their_torques():
     body = imports.with_arm()  # whose held joint stands between those of the legs
-    walk = measure_walk(body, "walk", Round({}, (0,), 100), GOALS["transport"])
+    walk = measure_walk(body, "walk", Round({}, (0,), 100))
     assert math.isclose(walk.power, 9.81 * walk.speed * walk.cost_of_transport, rel_tol=0.05)
 
 
 def test_tracking_counts_steps_after_a_fall_as_nothing():
     trial = Trial.of("shoved", {"kicks": 30.0}, "robustness", BUDGET, 150)
-    found = measure_walk(generate(4, 3), "shoved", trial.first, GOALS["robustness"])
-    calm = measure_walk(generate(4, 3), "shoved", trial.first._replace(settings={"kicks": 0.0}), GOALS["robustness"])
+    found = measure_walk(generate(4, 3), "shoved", trial.first)
+    calm = measure_walk(generate(4, 3), "shoved", trial.first._replace(settings={"kicks": 0.0}))
     assert found.falls == 1.0 and calm.falls == 0.0
     assert found.tracking < 0.8 * calm.tracking
