@@ -14,7 +14,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.studies import benchmark, csv_files, results, tables
-from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS
+from arc_suite.learning.studies.divisions import PLACES, SEEDS
 from arc_suite.learning.studies.tables import Run, Study
 
 
@@ -60,8 +60,7 @@ def read(name: str, published: Path) -> Study:
         raise ValueError(f"{published}: {what}")
     division, _, learner = name.partition("-")
     scores = benchmark.read(published.parent).get((division, learner), [])
-    is_declared = bool(scores) and not any(results.UNKNOWN_SOURCE in score.notes for score in scores)
-    source = DIVISIONS[division].source if is_declared else usage.UNKNOWN
+    source = benchmark.declared_source(division, scores)
     with parsers.guard(f"{published / results.RUNS}: damaged"):
         runs = tuple(_read_run(division, row, source) for row in rows)
         _check_learner(learner, runs)

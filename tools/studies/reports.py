@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from arc_suite.learning.studies import report, results
+from arc_suite.learning.studies import benchmark, report, results
 from arc_suite.learning.studies.tables import Study
 from studies import claims, leaderboard
 
@@ -22,6 +22,7 @@ def write(name: str, study: Study, published: Path) -> Path:
         ValueError: nothing is published, a table is damaged, or a folder next to it has the name of no study.
         OSError: a file cannot be read or written.
     """
+    benchmark.check_tables(published.parent)
     path = report.write(name, study, published, claims.sections(results.read_results(study.runs, published)))
     leaderboard.write(published.parent)
     return path

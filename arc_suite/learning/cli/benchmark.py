@@ -115,7 +115,7 @@ def score_policies(division: str) -> None:
     say(f"{folder}: {len(paths_by_run)} of the {size} policies of an entry, {evaluation.EPISODES} episodes each")
     judged = entries.score_policies(folder, paths_by_run, progress)
     studies = Path(FLAGS.results)
-    lines_by_run = {entries.run_name(policy.score): policy.lines for policy in judged}
+    lines_by_run = {policy.score.policy_name: policy.lines for policy in judged}
     publication.write_finals(studies / f"{division}-{name}", lines_by_run)
     benchmark.write(studies, division, name, [policy.score for policy in judged])
 

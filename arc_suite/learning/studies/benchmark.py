@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import checks, evaluation
+from arc_suite import checks, evaluation, parsers, usage
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.studies import csv_files, results
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS, TURNING, place_setup
@@ -67,6 +67,11 @@ class RunScore(NamedTuple):
         if self.task_kwargs:
             return Setup.of(self.robot, self.task, json.loads(self.task_kwargs))
         return place_setup(self.robot, self.task)
+
+    @property
+    def policy_name(self) -> str:
+        """Name under which the episodes of a policy of others are published."""
+        return f"{self.robot}-{self.task}-{self.seed}"
 
 
 COLUMNS = ("division", "learner", *RunScore._fields)  # columns of `SCORES`
@@ -185,13 +190,49 @@ def read(studies: Path) -> dict[tuple[str, str], list[RunScore]]:
     return scores_by_learner
 
 
+def check_tables(studies: Path) -> None:
+    """Check the tables from which the scores in a folder of studies come, where it has them.
+
+    Raises:
+        ValueError: a damaged table, or a source that its division does not give.
+        OSError: a table cannot be read.
+    """
+    for (division, learner), scores in read(studies).items():
+        published = studies / f"{division}-{learner}"
+        if (published / results.RUNS).exists():
+            results.check_tables(published, declared_source(division, scores))
+        elif (published / results.FINALS).exists():
+            read_finals(published, scores)
+
+
+def declared_source(division: str, scores: Sequence[RunScore]) -> str:
+    """Return what an algorithm declares that it learns from: by the notes of its scores, as the division or unknown."""
+    is_declared = bool(scores) and not any(results.UNKNOWN_SOURCE in score.notes for score in scores)
+    return DIVISIONS[division].source if is_declared else usage.UNKNOWN
+
+
+def read_finals(published: Path, scores: Sequence[RunScore]) -> Mapping[str, Sequence[Mapping[str, str]]]:
+    """Return the episodes that judge policies of others, by name of the policy, from the folder of their table.
+
+    Raises:
+        ValueError: a damaged table, or one without the episodes of a policy.
+        OSError: the table cannot be read.
+    """
+    lines_by_policy = results.read_episodes(published, results.FINALS)
+    with parsers.guard(f"{published / results.FINALS}: damaged"):
+        for score in scores:
+            results.check_finals(score.policy_name, lines_by_policy[score.policy_name], score.policy_sha256)
+    return lines_by_policy
+
+
 def text(studies: Path) -> str:
     """Return the table of the benchmark in Markdown: all learners in a folder of studies, by division and score.
 
     Raises:
-        ValueError: no scores, or a damaged table of them.
-        OSError: the table cannot be read.
+        ValueError: no scores, a damaged table of them, or as `check_tables`.
+        OSError: a table cannot be read.
     """
+    check_tables(studies)
     lines = []
     for (division, learner), scores in read(studies).items():
         groups = group_by_place(scores)

@@ -17,7 +17,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors, judging, provenance
 from arc_suite.learning import finals
 from arc_suite.learning.studies import results
-from arc_suite.learning.studies.benchmark import STYLE, RunScore, settings_cell, style_fields
+from arc_suite.learning.studies.benchmark import STYLE, RunScore, read_finals, settings_cell, style_fields
 from arc_suite.learning.studies.divisions import PLACES, SEEDS, place_setup
 from arc_suite.policies import Policy, frozen, named, network, other_libraries, separate
 from arc_suite.policies.frozen import Frozen
@@ -176,11 +176,6 @@ def score_lines(facts: Mapping[str, Any], lines: finals.Lines) -> RunScore:
     return RunScore(**{**facts, **values, **style_fields(setup, metrics)})
 
 
-def run_name(score: RunScore) -> str:
-    """Return the name under which the episodes of a policy are published."""
-    return f"{score.robot}-{score.task}-{score.seed}"
-
-
 def score_anew(scores: Sequence[RunScore], published: Path) -> list[RunScore]:
     """Return the scores of policies from their published episodes.
 
@@ -188,15 +183,9 @@ def score_anew(scores: Sequence[RunScore], published: Path) -> list[RunScore]:
         ValueError: a damaged table, or one without the episodes of a policy.
         OSError: the table cannot be read.
     """
-    lines_by_run = results.read_episodes(published, results.FINALS)
-    new_scores = []
+    lines_by_policy = read_finals(published, scores)
     with parsers.guard(f"{published / results.FINALS}: damaged"):
-        for score in scores:
-            name = run_name(score)
-            lines = lines_by_run[name]
-            results.check_finals(name, lines, score.policy_sha256)
-            new_scores.append(score_lines(score._asdict(), lines))
-    return new_scores
+        return [score_lines(score._asdict(), lines_by_policy[score.policy_name]) for score in scores]
 
 
 @contextlib.contextmanager

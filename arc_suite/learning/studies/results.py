@@ -132,16 +132,64 @@ def read_results(runs: Sequence[Run], published: Path) -> list[RunResult]:
         ValueError: a damaged table.
         OSError: a table cannot be read.
     """
-    episodes_by_run = read_episodes(published)
-    finals_by_run = read_episodes(published, FINALS)
-    row_by_run = {row["run"]: row for row in csv_files.read(published / RUNS, RUN_COLUMNS)}
+    tables = _read_tables(published)
     study_results = []
-    with parsers.guard(f"{published / EVALUATIONS}: damaged"):
-        for run in runs:
-            if run.name in episodes_by_run:
-                finals = finals_by_run.get(run.name, ())
-                study_results.append(_result(run, episodes_by_run[run.name], finals, row_by_run[run.name]))
+    for run in runs:
+        if run.name in tables.episodes:
+            _check_run(published, tables, run.name, run.configuration.definition.source)
+            study_results.append(_result(run, published, tables))
     return study_results
+
+
+def check_tables(published: Path, source: str = usage.UNKNOWN) -> None:
+    """Check the tables of a study: counts of episodes, steps, seeds of the episodes that judge policies, and sources.
+
+    Args:
+        published: folder of the study's tables.
+        source: what its algorithms declare that they learn from; unknown to allow all sources.
+
+    Raises:
+        ValueError: a damaged table, which the line begins with.
+        OSError: a table cannot be read.
+    """
+    tables = _read_tables(published)
+    for name in tables.episodes:
+        _check_run(published, tables, name, source)
+
+
+class _Tables(NamedTuple):
+    """Tables of a study.
+
+    Attributes:
+        episodes: rows of the evaluations by run.
+        finals: rows of the episodes that judge the latest policies by run; without runs from before or unfinished ones.
+        run_rows: row of each run by its name.
+    """
+
+    episodes: Mapping[str, Sequence[Mapping[str, str]]]
+    finals: Mapping[str, Sequence[Mapping[str, str]]]
+    run_rows: Mapping[str, Mapping[str, str]]
+
+
+def _read_tables(published: Path) -> _Tables:
+    """Return the tables in the folder of a study."""
+    run_rows = {row["run"]: row for row in csv_files.read(published / RUNS, RUN_COLUMNS)}
+    return _Tables(read_episodes(published), read_episodes(published, FINALS), run_rows)
+
+
+def _check_run(published: Path, tables: _Tables, name: str, source: str) -> None:
+    """Check the rows of a run; see `check_tables`."""
+    with parsers.guard(f"{published / EVALUATIONS}: damaged"):
+        evaluations = _group_by_step(tables.episodes[name])
+        _check_counts(name, [len(evaluation_rows) for evaluation_rows in evaluations])
+        last_step = int(evaluations[-1][0]["step"])
+    with parsers.guard(f"{published / RUNS}: damaged"):
+        _check_steps(name, tables.run_rows[name], last_step)
+        _check_sources(name, tables.run_rows[name], source)
+    if name in tables.finals:
+        finals = tables.finals[name]
+        with parsers.guard(f"{published / FINALS}: damaged"):
+            check_finals(name, finals, finals[0]["policy_sha256"])
 
 
 def read_episodes(published: Path, table: str = EVALUATIONS) -> dict[str, list[dict[str, str]]]:
@@ -153,52 +201,46 @@ def read_episodes(published: Path, table: str = EVALUATIONS) -> dict[str, list[d
     return rows_by_run
 
 
-def _result(
-    run: Run,
-    episodes: Sequence[Mapping[str, str]],
-    finals: Sequence[Mapping[str, str]],
-    run_row: Mapping[str, str],
-) -> RunResult:
-    """Return the result of a run from its rows in the tables of episodes, and its row in the table of runs.
-
-    Args:
-        run: the run.
-        episodes: episodes of the evaluations.
-        finals: episodes that judge the latest policy; none for a run from before, or one that is not finished.
-        run_row: row in the table of runs.
-    """
-    evaluations = _group_by_step(episodes)
-    _check_counts(run.name, [len(evaluation_rows) for evaluation_rows in evaluations])
-    _check_steps(run.name, run_row, int(evaluations[-1][0]["step"]))
-    if finals:
-        check_finals(run.name, finals, finals[0]["policy_sha256"])
+def _result(run: Run, published: Path, tables: _Tables) -> RunResult:
+    """Return the result of a run from its rows in the tables of a folder."""
+    evaluations = _group_by_step(tables.episodes[run.name])
+    latest = evaluations[-1]
+    judged = tables.finals.get(run.name, latest)
+    judged_table = FINALS if run.name in tables.finals else EVALUATIONS
 
     def curve_column(name: str) -> np.ndarray:
         """Return a column of the episodes of the curve, (evaluations, episodes)."""
         first_episodes = [evaluation_rows[: evaluation.CURVE_EPISODES] for evaluation_rows in evaluations]
         return np.array([[row[name] for row in rows] for rows in first_episodes], float)
 
-    latest = evaluations[-1]
-    judged = finals or latest
-    published_run = _with_settings(run, run_row["task_kwargs"])
-    updates_by_step = json.loads(run_row["phases"] or "{}")
-    return RunResult(
-        run=published_run,
-        steps=curve_column("step")[:, 0].astype(int),
-        returns=curve_column("return"),
-        finals=np.array([row["return"] for row in judged], float),
-        progress=_read_metrics(judged),
-        cpu=curve_column("cpu_seconds")[:, 0],
-        style=_read_style(latest),
-        phases=np.array(list(updates_by_step.values())),
-        training_seeds=from_json(json.loads(run_row[TRAINING_SEEDS] or "null")),
-        seeds=[int(row["seed"]) for row in judged],
-        curve_seeds=[int(row["seed"]) for row in latest[: evaluation.CURVE_EPISODES]],
-        physics_sha256=run_row[PHYSICS],
-        policy_sha256=judged[0].get("policy_sha256", ""),
-        other_settings=published_run != run,
-        sources=json.loads(run_row[SOURCES] or "[]"),
-    )
+    with parsers.guard(f"{published / EVALUATIONS}: damaged"):
+        curve_values = {
+            "steps": curve_column("step")[:, 0].astype(int),
+            "returns": curve_column("return"),
+            "cpu": curve_column("cpu_seconds")[:, 0],
+            "style": _read_style(latest),
+            "curve_seeds": [int(row["seed"]) for row in latest[: evaluation.CURVE_EPISODES]],
+        }
+    with parsers.guard(f"{published / judged_table}: damaged"):
+        judged_values = {
+            "finals": np.array([row["return"] for row in judged], float),
+            "progress": _read_metrics(judged),
+            "seeds": [int(row["seed"]) for row in judged],
+            "policy_sha256": judged[0].get("policy_sha256", ""),
+        }
+    with parsers.guard(f"{published / RUNS}: damaged"):
+        run_row = tables.run_rows[run.name]
+        published_run = _with_settings(run, run_row["task_kwargs"])
+        updates_by_step = json.loads(run_row["phases"] or "{}")
+        run_values = {
+            "run": published_run,
+            "phases": np.array(list(updates_by_step.values())),
+            "training_seeds": from_json(json.loads(run_row[TRAINING_SEEDS] or "null")),
+            "physics_sha256": run_row[PHYSICS],
+            "other_settings": published_run != run,
+            "sources": json.loads(run_row[SOURCES] or "[]"),
+        }
+    return RunResult(**curve_values, **judged_values, **run_values)
 
 
 def _read_metrics(episodes: Sequence[Mapping[str, str]]) -> dict[str, np.ndarray]:
@@ -245,7 +287,15 @@ def _check_steps(name: str, run_row: Mapping[str, str], last_step: int) -> None:
     """Check that a run's count of steps in the table of runs, if it has one, is the step of its latest evaluation."""
     counts = [int(run_row[column]) for column in usage.STEP_COUNTS if run_row[column]]
     if counts and sum(counts) != last_step:
-        raise ValueError(f"{name}: expected the {sum(counts):,} steps of {RUNS}, got {last_step:,}")
+        raise ValueError(f"{name}: expected the {last_step:,} steps of {EVALUATIONS}, got {sum(counts):,}")
+
+
+def _check_sources(name: str, run_row: Mapping[str, str], source: str) -> None:
+    """Check that a run has used no other source than its algorithm declares, or that this one is unknown."""
+    other_sources = [used for used in json.loads(run_row[SOURCES] or "[]") if used != source]
+    if source != usage.UNKNOWN and other_sources:
+        expected = "no source" if source == usage.NOTHING else f"no source but {source}"
+        raise ValueError(f"{name}: expected {expected}, got {', '.join(other_sources)}")
 
 
 def check_finals(name: str, finals: Sequence[Mapping[str, str]], sha256: str) -> None:
@@ -257,7 +307,7 @@ def check_finals(name: str, finals: Sequence[Mapping[str, str]], sha256: str) ->
     if not are_of(finals, sha256):
         expected_seeds = judging.seeds_of(sha256)
         expected = f"{len(expected_seeds)} episodes from seed {expected_seeds.start} on, which follow from the hash"
-        raise ValueError(f"{name}: {FINALS}: expected {expected} of one policy")
+        raise ValueError(f"{name}: expected {expected} of one policy")
 
 
 def read_demonstrators(published: Path) -> dict[str, dict[str, np.ndarray]]:

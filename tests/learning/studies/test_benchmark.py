@@ -3,6 +3,7 @@
 import functools
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 
@@ -359,7 +360,7 @@ def test_edited_episodes_of_judged_policies_are_refused(tmp_path, row, changes):
     assert again.result == 300.5
     lines[row : row + 1] = [] if changes is None else [lines[row] | changes]
     publication.write_finals(tmp_path, {"tick-walk-0": lines})
-    with refused(f"{tmp_path / 'finals.csv'}: damaged: tick-walk-0: finals.csv: expected 100 episodes ", begins=True):
+    with refused(f"{tmp_path / 'finals.csv'}: damaged: tick-walk-0: expected 100 episodes ", begins=True):
         entries.score_anew([entry], tmp_path)
 
 
@@ -382,7 +383,7 @@ def test_modules_are_scored_and_what_is_no_policy_is_left_out(tmp_path, monkeypa
     assert found.first_seed == judging.seeds_of(found.policy_sha256).start >= 4_100_000_000
     (episode,) = judged.lines
     assert episode["seed"] == str(found.first_seed) and float(episode["return"]) == found.result
-    publication.write_finals(tmp_path / "top-theirs", {entries.run_name(found): judged.lines})
+    publication.write_finals(tmp_path / "top-theirs", {found.policy_name: judged.lines})
     assert repr(entries.score_anew([found._replace(score=9.0, result=0.0)], tmp_path / "top-theirs")) == repr([found])
     with refused(f"{tmp_path / 'top-none' / 'finals.csv'}: damaged", begins=True):
         entries.score_anew([found], tmp_path / "top-none")
@@ -471,6 +472,36 @@ def test_a_track_is_run_and_resumed(tmp_path):
     tables = [(folder / name).read_bytes() for name in names]
     go()
     assert [(folder / name).read_bytes() for name in names] == tables
+
+
+@pytest.mark.parametrize(
+    ("name", "table", "changes", "line"),
+    [
+        ("samples-xqc", results.FINALS, {"seed": "7"}, "queen-walk-xqc-0: expected 100 episodes from seed 4"),
+        ("top-sb3_ppo", results.FINALS, {"seed": "7"}, "tick-walk-0: expected 100 episodes from seed 4"),
+        (
+            "samples-xqc",
+            results.RUNS,
+            {"sources": '["a policy"]'},
+            "queen-walk-xqc-0: expected no source, got a policy",
+        ),
+    ],
+)
+def test_the_table_is_refused_where_tables_of_runs_are_edited(tmp_path, name, table, changes, line):
+    shutil.copy(COMMITTED / benchmark.SCORES, tmp_path)
+    shutil.copytree(COMMITTED / name, tmp_path / name)
+    committed_scores = benchmark.read(tmp_path)
+    assert benchmark.text(tmp_path) == benchmark.text(COMMITTED)
+    path = tmp_path / name / table
+    rows = csv_files.read(path)
+    csv_files.write(path, list(rows[0]), [rows[0] | changes, *rows[1:]])
+    with refused(f"{path}: damaged: {line}", begins=True):
+        benchmark.text(tmp_path)
+    if table == results.RUNS:  # a run may use what an algorithm without a declaration learns from
+        scores = committed_scores["samples", "xqc"]
+        undeclared = [score._replace(notes=results.UNKNOWN_SOURCE) for score in scores]
+        benchmark.write(tmp_path, "samples", "xqc", undeclared)
+        assert results.UNKNOWN_SOURCE in benchmark.text(tmp_path)
 
 
 @pytest.mark.parametrize("name", [f"{division}-{learner}" for division, learner in benchmark.read(COMMITTED)])

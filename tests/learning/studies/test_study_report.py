@@ -6,6 +6,7 @@ import pathlib
 import numpy as np
 import pytest
 from published_tables import as_in_the_paper, cells, constant, publish
+from refusals import refused
 
 from arc_suite import evaluation, usage
 from arc_suite.envs.setup import Setup
@@ -172,10 +173,13 @@ def test_what_an_algorithm_has_used_is_noted_unless_it_declares_it(tmp_path, mon
     runs = [run("tick", name, 1_000_000) for name in ("mine", "sope")]
     for each in runs:
         publish(tmp_path, each, constant(100.0, 200.0))
-    rows = csv_files.read(tmp_path / results.RUNS)
-    for row in rows:
-        row["sources"] = '["a demonstrator", "prior data"]'
-    csv_files.write(tmp_path / results.RUNS, results.RUN_COLUMNS, rows)
+
+    def set_sources(*cells):
+        rows = csv_files.read(tmp_path / results.RUNS)
+        rows = [row | {"sources": cell} for row, cell in zip(rows, cells, strict=True)]
+        csv_files.write(tmp_path / results.RUNS, results.RUN_COLUMNS, rows)
+
+    set_sources('["a demonstrator", "prior data"]', '["prior data"]')
     mine, declared = results.read_results(runs, tmp_path)
     assert mine.notes == (
         "ten episodes",
@@ -184,11 +188,11 @@ def test_what_an_algorithm_has_used_is_noted_unless_it_declares_it(tmp_path, mon
         "has used a demonstrator",
         "has used prior data",
     )
-    assert declared.sources == mine.sources and declared.notes == (
-        "ten episodes",
-        results.SEEN_SEEDS,
-        "has used a demonstrator",
-    )
+    assert declared.sources == ["prior data"] and declared.notes == ("ten episodes", results.SEEN_SEEDS)
+    set_sources("[]", '["a demonstrator", "prior data"]')
+    line = "tick-walk-sope-0: expected no source but prior data, got a demonstrator"
+    with refused(f"{tmp_path / 'runs.csv'}: damaged: {line}"):
+        results.read_results(runs, tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -202,9 +206,11 @@ def test_what_an_algorithm_has_used_is_noted_unless_it_declares_it(tmp_path, mon
         ),
         (results.FINALS, 0, {"policy_sha256": "cd" * 32}, "100 episodes from seed [0-9]+ on, .* of one policy"),
         (results.FINALS, 99, None, "100 episodes from seed [0-9]+ on, which follow from the hash of one policy"),
-        (results.RUNS, 0, {"environment_steps": "999"}, "expected the 999 steps of runs.csv, got 1,000,000"),
+        (results.RUNS, 0, {"environment_steps": "999"}, "expected the 1,000,000 steps of evaluations.csv, got 999"),
+        (results.RUNS, 0, {"sources": '["a demonstrator"]'}, "expected no source, got a demonstrator"),
+        (results.EVALUATIONS, 0, None, r"expected 10 episodes of a step, got \[9, 10\]"),
     ],
-    ids=["seed", "hash", "fewer episodes", "steps"],
+    ids=["seed", "hash", "fewer episodes", "steps", "source", "fewer of the curve"],
 )
 def test_edited_tables_are_refused(tmp_path, table, row, changes, line):
     each = run("tick", "sac", 1_000_000)
@@ -214,8 +220,9 @@ def test_edited_tables_are_refused(tmp_path, table, row, changes, line):
     columns = list(rows[0])
     rows[row : row + 1] = [] if changes is None else [rows[row] | changes]
     csv_files.write(tmp_path / table, columns, rows)
-    with pytest.raises(ValueError, match=f"damaged: {each.name}: .*{line}"):
-        results.read_results([each], tmp_path)
+    for check in (lambda: results.read_results([each], tmp_path), lambda: results.check_tables(tmp_path, "nothing")):
+        with pytest.raises(ValueError, match=f"^{tmp_path / table}: damaged: {each.name}: .*{line}"):
+            check()
 
 
 def test_seeds_with_one_policy_are_noted(tmp_path):
