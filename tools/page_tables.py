@@ -1,4 +1,4 @@
-"""Writes the tables of committed studies into pages of docs/.
+"""Writes tables of committed studies, and of the metrics of tasks, into pages of docs/.
 
 A table stands between a line with its name, such as <!-- table -->, and the line <!-- end --> of its page. The table
 `coverage` says how often intervals hold the expected score: it is simulated. First the scores of the benchmark, in
@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from studies.pages import table_writer
+from website.tasks import metrics_of_all_tasks
 
 from arc_suite.cli import program
 from arc_suite.learning.studies import benchmark, entries, results
@@ -63,6 +64,7 @@ TABLES: dict[tuple[str, str], Callable[[], str]] = {
     ("benchmark", "peers"): lambda: peers.text(STUDIES),
     ("any_body", "table"): lambda: bodies.text(STUDIES / "bodies.csv"),
     ("results", "packaged"): lambda: packaged.text(PACKAGED / "policies.json"),
+    ("tasks", "metrics"): metrics_of_all_tasks,
     ("study", "table"): returns_next_to_the_papers,
     ("algorithms", "parallel-parts"): lambda: kinds.text(STUDIES, "parallel-parts"),
     ("algorithms", "legs"): lambda: kinds.text(STUDIES, "legs"),

@@ -68,7 +68,7 @@ _GUIDES = {"mimic": "motions", "recover": "motions"}  # pages in docs/ that expl
 # Definitions of metrics by name.
 METRICS = {
     "speed": "mean velocity along world x, m/s",
-    "distance": "distance along the lane, as a share of that at v*, over the whole episode",
+    "distance": "distance along the lane, as a share of that at the target velocity over the whole episode",
     "goals": "number of goals reached",
     "tracking": "mean of what the steps earn for following the command, at most 1",
     "pose_tracking": "mean of what the steps earn for keeping the pose, at most 1",
@@ -76,7 +76,7 @@ METRICS = {
     "fell": "1 if the body fell",
     "sank": "1 if a foot got stuck under the ground, a contact artifact",
     "gait_compliance": "share of foot samples that agree with the prescribed contact schedule",
-    "cost_of_transport": "positive work of the motors by weight and path",
+    "cost_of_transport": "positive work of the motors and their heat, by weight and path",
     "joint_error": "root of the mean square error of joint angles, rad",
     "torso_error": "root of the mean square distance of the torso from that of the motion, standing heights",
     "up": "1 if the body got up",
@@ -230,10 +230,26 @@ def _end(task_class: type[Task], tasks: Mapping[str, Task]) -> str:
 
 def _metrics(name: str) -> str:
     """Return the table of a task's metrics."""
+    return table(("metric", "meaning"), [[f"`{metric}`", METRICS[metric]] for metric in _metric_names(name)])
+
+
+def metrics_of_all_tasks() -> str:
+    """Return the table of all metrics, and of the tasks that have each."""
+    names_of_task = {task: _metric_names(task) for task in TASKS}
+    rows = []
+    for metric, meaning in METRICS.items():
+        tasks = [f"`{task}`" for task, names in names_of_task.items() if metric in names]
+        if tasks:
+            rows.append([f"`{metric}`", meaning, ", ".join(tasks)])
+    return table(("metric", "meaning", "tasks"), rows)
+
+
+def _metric_names(task: str) -> list[str]:
+    """Return the names of a task's metrics."""
     first_robot = next(iter(ROBOTS))
-    environment = arc_suite.load(first_robot, name)
+    environment = arc_suite.load(first_robot, task)
     environment.reset()
-    return table(("metric", "meaning"), [[f"`{metric}`", METRICS[metric]] for metric in environment.task.progress])
+    return list(environment.task.progress)
 
 
 def _measured_demonstrators(name: str) -> str:
