@@ -69,10 +69,10 @@ def shaped(body: Body, **changes: Any) -> Body:
         if nothing changes.
 
     Raises:
-        ValueError: a value or a length out of range, a link that the body does not have, another torso of an imported
-            body, or as `torsos.replace_torso`.
+        ValueError: an unknown change, a value or a length out of range, a link that the body does not have, another
+            torso of an imported body, or as `torsos.replace_torso`.
     """
-    shape = Shape(**changes)
+    shape = Shape(**{checks.name(name, Shape._fields, "change of a shape"): value for name, value in changes.items()})
     body_ends = link_ends(body)
     link_factors = {}
     for name, factor in shape.links.items():

@@ -97,6 +97,11 @@ def test_any_body_can_be_shaped_and_loaded(body):
     ("changes", "message"),
     [
         (
+            {"widht": 1.2},
+            "unknown change of a shape 'widht'; did you mean 'width'? (there are: scale, length, width, thickness, fan, "
+            "torso, head, tail, links, ends)",
+        ),
+        (
             {"links": {"lowr": 1.5}},
             "unknown link 'lowr'; did you mean 'lower'? (there are: upper, middle, lower, of one leg, as l1_upper)",
         ),

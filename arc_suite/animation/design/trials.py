@@ -29,8 +29,8 @@ class WalkMeans(NamedTuple):
         achieved: share of the command that is achieved. In tasks that lead along x, it is the displacement, divided by
             that at the target velocity; in other tasks, it is `tracking`.
         tracking: mean of the task's tracking over all steps, 0 after a fall; NaN in a task without tracking.
-        cost_of_transport: positive work of the motors, divided by weight and path.
-        power: mean positive power of the motors until the end of an episode, W/kg.
+        cost_of_transport: positive work of the motors and heat of their windings, divided by weight and path.
+        power: the same work and heat until the end of an episode, divided by mass and time, W/kg.
         falls: share of the episodes that ended early in a fall.
     """
 
