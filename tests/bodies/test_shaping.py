@@ -98,8 +98,8 @@ def test_any_body_can_be_shaped_and_loaded(body):
     [
         (
             {"widht": 1.2},
-            "unknown change of a shape 'widht'; did you mean 'width'? (there are: scale, length, width, thickness, fan, "
-            "torso, head, tail, links, ends)",
+            "unknown change of a shape 'widht'; did you mean 'width'? (there are: scale, length, width, thickness, "
+            "fan, torso, head, tail, links, ends)",
         ),
         (
             {"links": {"lowr": 1.5}},
