@@ -23,7 +23,7 @@ except ImportError:  # Windows
     import msvcrt
 
 MAX_JSON = 1 << 24  # bytes
-RUNS = "runs"  # folder of runs, by default
+RUNS_FOLDER = "runs"  # where runs are by default
 ADDRESS_CURE = "it is an address: download the file, and name its path"
 
 # Errors of a disk that is full, of limits on the size of files and of a broken disk; they name no file.

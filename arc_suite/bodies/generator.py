@@ -262,9 +262,9 @@ def mutated(body: Body, seed: int, amount: float = 0.1) -> Body:
 
 
 def list_deformations(body: Body) -> tuple[str, ...]:
-    """Return what `deform_legs` changes, by names such as l1_upper for a length and l1_heading for a heading.
+    """Return the names of the numbers that `deform_legs` takes: l1_upper of a length, l1_heading of a heading, ...
 
-    A leg has its name, and stands for its mirror images, too. Of imported bodies only links with a length of their own
+    The name of a leg stands for its mirror images, too. Of imported bodies only links with a length of their own
     change.
     """
     if body.source:
@@ -282,14 +282,19 @@ def deform_legs(body: Body, changes: np.ndarray) -> Body:
     Args:
         body: body to change.
         changes: (deformations,) in the order of `list_deformations`: the logarithm of the factor of a length, or the
-            turn of a leg about the vertical, rad. Legs of imported bodies do not turn; see `imported_variants`.
+            turn of a leg about the vertical, rad. Where a foot would leave its height, all links of the leg then change
+            in height. Legs of imported bodies do not turn; see `imported_variants`.
 
     Returns:
         The body, `<name>_mutated`, to be sized anew; an imported body keeps its motors.
 
     Raises:
-        ValueError: a length grown out of range.
+        ValueError: other numbers of changes, or a length grown out of range.
     """
+    changes = np.asarray(changes, float)
+    names = list_deformations(body)
+    if changes.shape != (len(names),):
+        raise ValueError(f"changes: expected {len(names)} numbers, of {', '.join(names)}, got shape {changes.shape}")
     if body.source:
         variant = imported_variants.deform_imported_legs(body, changes)
         return variant.replace(name=_changed_name(body, "mutated"))

@@ -26,9 +26,10 @@ CURES = {
 # Those of programs that have --output.
 CURES_OF_OUTPUTS = {"format": "the extension of the output is its format"}
 # Values out of the range of a flag, which something else takes.
-CURES_OF_VALUES = {("legs", "3"): "a body of 3 legs is a spec, --spec=FILE"}
-# Numbers above the range of a flag, by its name.
-CURES_OF_LARGER_VALUES = {"seeds": "more seeds are a study of one's own, docs/study.md"}
+CURES_OF_VALUES = {
+    ("legs", "3"): "a body of 3 legs is a spec, --spec=FILE",
+    **{("seeds", count): "more seeds are a study of one's own, docs/study.md" for count in ("4", "5", "8", "10", "20")},
+}
 # Flags whose values a shell changes, unless they are quoted.
 CURES_OF_MISSING_VALUES = {"palette": "a shell drops what follows a #: quote the colors, --palette='#3a5f2b'"}
 

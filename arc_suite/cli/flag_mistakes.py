@@ -14,7 +14,6 @@ from absl import flags
 from arc_suite import checks, policies, registry
 from arc_suite.cli.flag_cures import (
     CURES,
-    CURES_OF_LARGER_VALUES,
     CURES_OF_MISSING_VALUES,
     CURES_OF_OUTPUTS,
     CURES_OF_PROGRAMS,
@@ -103,8 +102,6 @@ def refuse_value(error: flags.IllegalFlagValueError) -> None:
         hint = checks.hint_integer(value, parser.lower_bound, parser.upper_bound, before=f"--{name}=")
     if (name, value) in CURES_OF_VALUES:
         hint = f"; {CURES_OF_VALUES[name, value]}"
-    if name in CURES_OF_LARGER_VALUES and value.isdecimal() and int(value) > parser.upper_bound:
-        hint = f"; {CURES_OF_LARGER_VALUES[name]}"
     raise ValueError(f"{checks.quote(flag_and_value)}: expected {expected}{hint}") from None
 
 

@@ -120,7 +120,7 @@ def difference_and_interval(
         The difference, and the ends of the interval; they are NaN if a stratum has fewer than `MIN_RUNS` runs.
 
     Raises:
-        ValueError: no strata, other numbers of them, or one holds no value, or NaN.
+        ValueError: no strata, different numbers of them, or one without a value or with NaN.
     """
     samples_x, samples_y = _sample_pairs(strata_x, strata_y)
     # The mean over all 2 n strata of X and of -Y is half of the mean difference.
@@ -179,7 +179,7 @@ def probability_of_improvement(strata_x, strata_y, seed: int = 0) -> tuple[float
         The probability, and the ends of the interval.
 
     Raises:
-        ValueError: no strata, other numbers of them, or one holds no value, or NaN.
+        ValueError: no strata, different numbers of them, or one without a value or with NaN.
     """
     random = np.random.default_rng(seed)
     pairs = list(zip(*_sample_pairs(strata_x, strata_y), strict=True))

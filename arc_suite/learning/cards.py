@@ -81,7 +81,7 @@ def _relative_path(folder: Path) -> Path:
     path = folder.resolve()
     if Path.cwd() in path.parents:
         return path.relative_to(Path.cwd())
-    return Path(files.RUNS) / path.name
+    return Path(files.RUNS_FOLDER) / path.name
 
 
 def _metadata(run: Configuration, mean_return: float) -> str:

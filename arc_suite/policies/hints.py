@@ -59,8 +59,8 @@ def refuse_other_words(name: Any, policy_names: Iterable[str]) -> None:
     if isinstance(name, str) and os.path.isfile(f"{name}.py"):
         first_name, *_ = [*_list_functions(Path(f"{name}.py")), f"{name}.py:NAME"]
         raise ValueError(f"unknown policy {checks.preview(name)}; did you mean {first_name}?")
-    if isinstance(name, str) and os.path.isfile(os.path.join(files.RUNS, name, network.FILE)):
-        raise ValueError(f"unknown policy {checks.preview(name)}; did you mean {files.RUNS}/{name}?")
+    if isinstance(name, str) and os.path.isfile(os.path.join(files.RUNS_FOLDER, name, network.FILE)):
+        raise ValueError(f"unknown policy {checks.preview(name)}; did you mean {files.RUNS_FOLDER}/{name}?")
     hint = files.suggest_path(name) if isinstance(name, str) and not checks.hint(name, policy_names) else ""
     if hint:
         raise ValueError(f"unknown policy {checks.preview(name)}{hint}")

@@ -2,6 +2,7 @@
 
 import math
 
+import imports
 import mujoco
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from dm_control import mjcf
 from refusals import refused
 
 from arc_suite import models
-from arc_suite.bodies import generator
+from arc_suite.bodies import generator, shaping
 from arc_suite.models.standing import measure_standing
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import SpecError
@@ -180,3 +181,33 @@ def test_generated_bodies_do_not_take_the_names_of_robots():
     long = ROBOTS["queen"].replace(name="q" * 32)
     assert generator.scaled(long, 2.0).name == "q" * 25 + "_scaled"
     assert generator.mutated(long, 0).name == "q" * 24 + "_mutated"
+
+
+DEFORMED = [generator.generate(5, 4), ROBOTS["tick"], imports.quadruped()]
+
+
+def horizontal_lengths(body):
+    """Lengths of links in the ground's plane, which heights of feet do not change."""
+    return {part: np.linalg.norm(end[:2]) for part, end in shaping.link_ends(body).items()}
+
+
+@pytest.mark.parametrize("body", DEFORMED, ids=lambda body: body.name)
+def test_deformations_are_named_by_what_they_change(body):
+    names = generator.list_deformations(body)
+    lengths = horizontal_lengths(body)
+    for index, name in enumerate(names):
+        changed_body = generator.deform_legs(body, 0.1 * np.eye(len(names))[index])
+        if name.endswith("_heading"):
+            headings, new_headings = ({leg.name: leg.yaw_deg for leg in spec.legs} for spec in (body, changed_body))
+            leg_name = name.removesuffix("_heading")
+            assert new_headings[leg_name] - headings[leg_name] == pytest.approx(np.degrees(0.1))
+        else:
+            new_lengths = horizontal_lengths(changed_body)
+            assert new_lengths[name] == pytest.approx(np.exp(0.1) * lengths[name])
+            others = [part for part in lengths if not part.endswith(name.partition("_")[2])]
+            assert [new_lengths[part] for part in others] == pytest.approx([lengths[part] for part in others])
+
+
+def test_other_numbers_of_deformations_are_refused():
+    with refused("changes: expected 12 numbers, of l1_upper, l1_middle, l1_lower, l1_heading, ", begins=True):
+        generator.deform_legs(generator.generate(6, 3), [0.1, 0.2])

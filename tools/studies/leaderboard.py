@@ -54,7 +54,7 @@ def write(studies: Path) -> None:
     names = sorted(path.parent.name for path in studies.glob(f"*/{results.RUNS}"))
     rows = [row for name in names for row in study_rows(name, studies / name)]
     csv_files.write(studies / TABLE, HEADS, rows)
-    heads = HEADS[:-1]  # the configuration only tells rows apart
+    heads = HEADS[:-1]  # the configuration says which rows of studies are the same
     lines = []
     for row in rank_configurations(rows):
         linked_row = row | {"study": link(row)}

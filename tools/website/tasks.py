@@ -237,10 +237,9 @@ def metrics_of_all_tasks() -> str:
     """Return the table of all metrics, and of the tasks that have each."""
     names_of_task = {task: _metric_names(task) for task in TASKS}
     rows = []
-    for metric, meaning in METRICS.items():
+    for metric in sorted({name for names in names_of_task.values() for name in names}, key=list(METRICS).index):
         tasks = [f"`{task}`" for task, names in names_of_task.items() if metric in names]
-        if tasks:
-            rows.append([f"`{metric}`", meaning, ", ".join(tasks)])
+        rows.append([f"`{metric}`", METRICS[metric], ", ".join(tasks)])
     return table(("metric", "meaning", "tasks"), rows)
 
 

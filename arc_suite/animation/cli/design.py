@@ -210,7 +210,7 @@ def main() -> None:
     task_settings = named_values("set", FLAGS["set"].value)
     trial = Trial.of(task, task_settings, FLAGS.goal, budget_from_flags(around), FLAGS.steps)
     search = Search(space, cell_map, trial, FLAGS.seed, stem, FLAGS.random)
-    check_one_step(trial, search.middle_body())
+    check_one_step(trial, cell_map, search.middle_body())
     if FLAGS.pages:
         pages.viewer_script()  # raises an error now if there is no viewer
     folder = files.folder(FLAGS.output)
@@ -246,11 +246,12 @@ def write_results(
         gallery.write_page(folder / "gallery.html", pictures, cell_map, f"{trial.goal} in {trial.task}")
 
 
-def check_one_step(trial: Trial, body: Body | str) -> None:
-    """Let one body take a step, to find errors before the search.
+def check_one_step(trial: Trial, cell_map: Map, body: Body | str) -> None:
+    """Find the cell of one body and let it take a step, to find errors before the search.
 
     Args:
         trial: trial of the search.
+        cell_map: map of the search.
         body: body to try, or the reason why there is no body.
 
     Raises:
@@ -258,6 +259,7 @@ def check_one_step(trial: Trial, body: Body | str) -> None:
     """
     if isinstance(body, str):
         raise ValueError(body)
+    cell_map.cell(body)
     goal = goal_of(trial.goal)
     measure_walk(body, trial.task, trial.first._replace(steps=1), goal.preset)
     second_walk = measure_walk(body, trial.task, trial.second._replace(steps=1), goal.preset)
@@ -268,7 +270,7 @@ def check_one_step(trial: Trial, body: Body | str) -> None:
 def print_table(elites: Iterable[gallery.Elite], trial: Trial) -> None:
     """Print a row for each cell: its body, and the metric in both evaluations."""
     goal = goal_of(trial.goal)
-    unit = goal.unit.replace(" ", ", ")
+    unit = goal.unit.replace(" ", ", ", 1)
     line = "{:<24} {:>6} {:>17} {:>15} {:>12}"
     print(line.format("cell", "body", f"{goal.metric_text}{unit}", "evaluated again", "power, W/kg"))
     for elite in elites:

@@ -85,19 +85,23 @@ class Map(NamedTuple):
             amount: standard deviation of the logarithms of the variants' lengths.
 
         Raises:
-            ValueError: an unknown axis, a repeated one, or more than two.
+            ValueError: an unknown axis, a repeated one, more than two, or one whose value of `around` is not above 0.
         """
-        axes = [axis_of(name) for name in names]
-        if len(names) not in (1, 2) or len(set(names)) < len(names):
+        axes = {registry.bare_name(name): axis_of(name) for name in names}
+        if len(names) not in (1, 2) or len(axes) < len(names):
             raise ValueError(f"map: expected one or two different axes of {', '.join(AXES)}, got {','.join(names)}")
-        edges = tuple(_bin_edges(axis, around, amount) for axis in axes)
+        edges = tuple(_bin_edges(name, axis, around, amount) for name, axis in axes.items())
         return cls(tuple(names), edges)
 
     def cell(self, body: Body) -> tuple[int, ...]:
-        """Return the bin of a body on each axis: its count, or the number of its bin, from 1."""
+        """Return the bin of a body on each axis: its count, or the number of its bin, from 1.
+
+        Raises:
+            ValueError: an axis has no finite value of the body.
+        """
         cell = []
         for name, edges in zip(self.names, self.edges, strict=True):
-            value = axis_of(name).measure(body)
+            value = checks.number(f"axis {registry.bare_name(name)}", axis_of(name).measure(body))
             cell.append(int(value) if edges is None else 1 + int(np.searchsorted(edges, value)))
         return tuple(cell)
 
@@ -113,9 +117,11 @@ class Map(NamedTuple):
         return ", ".join(texts)
 
 
-def _bin_edges(axis: Axis, around: Body | None, amount: float) -> tuple[float, ...] | None:
+def _bin_edges(name: str, axis: Axis, around: Body | None, amount: float) -> tuple[float, ...] | None:
     """Return the edges of the bins of an axis; see `Map.of`."""
     if axis.edges is None or around is None:
         return axis.edges
-    value = axis.measure(around)
+    value = checks.number(f"axis {name}", axis.measure(around))
+    if value <= 0.0:
+        raise ValueError(f"axis {name}: expected a value above 0 of {around.name}, got {value:g}")
     return tuple(round(value * math.exp(amount * deviation), 4) for deviation in VARIANT_EDGES)

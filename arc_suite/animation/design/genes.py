@@ -25,7 +25,7 @@ class Budget(NamedTuple):
         mass: mass of every body, kg; its density follows. None: bodies weigh what their parts weigh.
         span: greatest extent of the standing body along x, y or z, m.
         height: greatest standing height, m.
-        power: greatest mean of the motors' positive power over a walk, W/kg.
+        power: greatest mean power of a walk, W/kg: positive work of the motors and heat of their windings.
     """
 
     mass: float | None

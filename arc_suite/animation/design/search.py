@@ -95,6 +95,7 @@ class Search:
         self._space = space
         self._cell_map = cell_map
         self._trial = trial
+        self._goal = goal_of(trial.goal)
         self._seed = seed
         self._stem = stem
         self._random_bodies = random_bodies
@@ -127,10 +128,9 @@ class Search:
 
     def add(self, batch: Candidates) -> None:
         """Add evaluated bodies: a body whose second evaluation exceeds that of its cell's elite becomes the elite."""
-        goal = goal_of(self._trial.goal)
         for candidate in batch.candidates:
             may_be_elite = not candidate.outcome.reason and candidate.outcome.second is not None
-            if may_be_elite and goal.value(candidate.outcome.second) > self._elite_value(candidate.cell):
+            if may_be_elite and self._goal.value(candidate.outcome.second) > self._elite_value(candidate.cell):
                 self.elites[candidate.cell] = len(self.candidates)
             self.candidates.append(candidate)
 
@@ -166,4 +166,4 @@ class Search:
         if cell not in self.elites:
             return -np.inf
         elite = self.candidates[self.elites[cell]]
-        return goal_of(self._trial.goal).value(elite.outcome.second)
+        return self._goal.value(elite.outcome.second)

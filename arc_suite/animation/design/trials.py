@@ -51,7 +51,7 @@ class Goal(NamedTuple):
         task: name of the default task.
         preset: preset of the demonstrator; None for the one that suits task and body.
         may_fall: whether a fall lowers the metric only, and does not exclude the body.
-        unit: unit of the metric.
+        unit: unit of the metric, with the space before it.
         measure: returns the metric of a walk; None for the field of `WalkMeans` that `metric` names.
     """
 
@@ -187,9 +187,9 @@ def evaluate(trial: Trial, body: Body | str, elite_value: float) -> Outcome:
         if first_reason or goal.value(first) <= elite_value:
             return Outcome(first_reason, first)
         second = measure_walk(body, trial.task, trial.second, goal.preset)
+        second_reason = exclusion_reason(goal, trial.budget, second)
     except ValueError as error:
         return Outcome(f"refused: {error}")
-    second_reason = exclusion_reason(goal, trial.budget, second)
     return Outcome(f"evaluated again: {second_reason}" if second_reason else "", first, second)
 
 
@@ -216,7 +216,7 @@ def measure_walk(body: Body, task: str, episodes: Round, preset: str | None = No
         preset: preset of the demonstrator; None for the one that suits task and body.
 
     Raises:
-        ValueError: a setting that does not fit, or a body that no demonstrator walks.
+        ValueError: a setting that does not fit, a task without a gait, or a body that no demonstrator walks.
     """
     environment, policy = open_walk(body, task, episodes, preset)
     try:
@@ -235,6 +235,9 @@ def open_walk(body: Body, task: str, episodes: Round, preset: str | None) -> tup
     """
     settings = {**episodes.settings, **_DIVERGENCE_SETTINGS}
     environment = Setup.of(body, task, settings).load(episodes.seeds[0])
+    if environment.task.definition.parameters is None:
+        environment.close()
+        raise ValueError(f"task {task}: expected one that prescribes a gait")
     policy = policies.policy("cpg", body, preset, task=environment.task.definition)
     return environment, policy
 

@@ -146,7 +146,7 @@ def _suggest_run(path: Path) -> str:
     It is "" for none.
     """
     if not path.exists():
-        path_in_runs = Path(files.RUNS) / path
+        path_in_runs = Path(files.RUNS_FOLDER) / path
         return f"; did you mean {path_in_runs}?" if (path_in_runs / CONFIG).exists() else files.suggest_path(path)
     configs = [path.parent / CONFIG] if path.is_file() else sorted(path.glob(f"*/{CONFIG}"))
     runs = [config.parent for config in configs if config.exists()]

@@ -34,7 +34,7 @@ flags.DEFINE_list("places", _PLACE_NAMES, "Places to run, ROBOT-TASK. [default: 
 flags.DEFINE_integer("jobs", None, "Runs at a time. [default: as many as cores]", lower_bound=1)
 flags.DEFINE_string("policies", None, "Folder of policies to score in place of runs.")
 flags.DEFINE_string("name", None, "Of these policies in the table. [default: the name of the folder]")
-flags.DEFINE_string("runs", files.RUNS, "Folder of the runs.")
+flags.DEFINE_string("runs", files.RUNS_FOLDER, "Folder of the runs.")
 flags.DEFINE_string("results", "studies", "Folder of the tables and reports.")
 
 _FLAGS_OF_RUNS = ("algorithm", "seeds", "places", "jobs", "runs")
@@ -88,8 +88,8 @@ def run_division(division: str, places: list[str]) -> int:
     runs = [run for run in study.runs if _is_selected(run, places)]
     with resumable(folder):
         status = runner.make(runs, folder, FLAGS.jobs or usable_cores(), progress)
-    for run in runs:  # before their policies are judged
-        benchmark.check_steps(run, run_folder.read_progress(folder / run.name).get("evaluated", 0))
+    for run in study.runs:  # before their policies are judged
+        benchmark.check_budget(run, run_folder.read_progress(folder / run.name).get("evaluated", 0))
     publication.publish(study.runs, folder, published, progress)
     run_results = results.read_results(study.runs, published)
     if run_results:

@@ -92,7 +92,7 @@ def make_or_report(
     runs = study.runs[part::parts]
     if not runs:
         raise ValueError(f"--shard={FLAGS.shard}: no run, as the study has {len(study.runs)}")
-    folder = Path(FLAGS.runs or Path(files.RUNS, tables.folder_name(name)))
+    folder = Path(FLAGS.runs or Path(files.RUNS_FOLDER, tables.folder_name(name)))
     results = results_folder(name)
     if FLAGS.report:
         publication.publish(study.runs, folder, results, progress)

@@ -190,7 +190,7 @@ def train_run(run: Configuration, threshold: float | None) -> int:
         run: configuration of the run.
         threshold: mean return of an evaluation after which the run stops; None to train to the end.
     """
-    folder = Path(FLAGS.output or Path(files.RUNS, run.name))
+    folder = Path(FLAGS.output or Path(files.RUNS_FOLDER, run.name))
 
     def success_step() -> int | None:
         return None if threshold is None else outcomes.first_step_above(folder, threshold)
@@ -292,7 +292,7 @@ def train_seeds(runs: Sequence[Configuration]) -> int:
 
     Each run is a process of this command with one seed.
     """
-    folder = files.folder(FLAGS.output or files.RUNS)
+    folder = files.folder(FLAGS.output or files.RUNS_FOLDER)
     arguments = sys.argv[sys.argv.index("train") + 1 :]
 
     def command(run):
@@ -318,7 +318,7 @@ def train_seeds(runs: Sequence[Configuration]) -> int:
 def train_seeds_on_device(runs: Sequence[Configuration]) -> int:
     """Train runs of several seeds in one program, print their results and their mean, and return the exit status."""
     refuse_flags(("jobs", "minutes", "until_score"), "goes without several seeds in one program")
-    folder = files.folder(FLAGS.output or files.RUNS)
+    folder = files.folder(FLAGS.output or files.RUNS_FOLDER)
     folders = [folder / run.name for run in runs]
     with resumable(folder), watch_for_termination() as is_terminated, contextlib.ExitStack() as stack:
         listeners = [stack.enter_context(open_listeners(*pair)) for pair in zip(runs, folders, strict=True)]

@@ -89,7 +89,7 @@ def _score_result(result: RunResult) -> RunScore:
     Raises:
         ValueError: the run has made more environment steps than its division gives.
     """
-    check_steps(result.run, int(result.steps[-1]))
+    check_budget(result.run, int(result.steps[-1]))
     setup = result.run.configuration.setup
     scale = results.anchors_of(result, result.curve_seeds)
     half = np.inf if scale is None else scale.at(HALF)
@@ -111,7 +111,7 @@ def _score_result(result: RunResult) -> RunScore:
     )
 
 
-def check_steps(run: Run, steps: int) -> None:
+def check_budget(run: Run, steps: int) -> None:
     """Check the steps of a run against those of its division.
 
     Raises:

@@ -291,7 +291,7 @@ def _check_steps(name: str, run_row: Mapping[str, str], last_step: int) -> None:
 
 
 def _check_sources(name: str, run_row: Mapping[str, str], source: str) -> None:
-    """Check that a run has used no other source than its algorithm declares, or that this one is unknown."""
+    """Check that a run has used no other source than its algorithm declares; one that is unknown allows all."""
     other_sources = [used for used in json.loads(run_row[SOURCES] or "[]") if used != source]
     if source != usage.UNKNOWN and other_sources:
         expected = "no source" if source == usage.NOTHING else f"no source but {source}"

@@ -6,8 +6,10 @@ import imports
 import numpy as np
 import pytest
 import sprung_robots
+from refusals import refused
 
-from arc_suite.animation.design.axes import AXES, Map
+from arc_suite.animation.design import axes
+from arc_suite.animation.design.axes import AXES, Axis, Map
 from arc_suite.animation.design.genes import Budget, ProportionGenes, VariantGenes, body_within_budget, extent
 from arc_suite.bodies.generator import list_deformations, mutated, random_body
 from arc_suite.importing import import_robot
@@ -112,3 +114,28 @@ def test_axes_that_do_not_fit_are_one_line(names):
     with pytest.raises(ValueError, match=", ".join(AXES)) as error:
         Map.of(names)
     assert "\n" not in str(error.value)
+
+
+NEGATIVE = Axis(lambda body: -1.0, edges=(0.0,))
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        (["negative"], "axis negative: expected a value above 0 of tick, got -1"),
+        (["legs", "there:legs"], "map: expected one or two different axes of legs, links, height, width, "),
+        (["unknown"], "unknown axis 'unknown' "),
+    ],
+)
+def test_axes_of_others_are_checked(monkeypatch, names, message):
+    monkeypatch.setattr(axes, "axis_of", {"negative": NEGATIVE, "legs": AXES["legs"], "there:legs": AXES["legs"]}.get)
+    if names == ["unknown"]:
+        monkeypatch.undo()
+    with refused(message, begins=True):
+        Map.of(names, ROBOTS["tick"], 0.1)
+
+
+def test_an_axis_without_a_finite_value_is_one_line(monkeypatch):
+    monkeypatch.setitem(AXES, "nothing", Axis(lambda body: math.nan, edges=(0.0,)))
+    with refused("axis nothing: expected a finite number, got nan", begins=True):
+        Map.of(["nothing"]).cell(ROBOTS["tick"])

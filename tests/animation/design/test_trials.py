@@ -44,6 +44,20 @@ def test_a_metric_that_is_no_number_is_one_line(measure, message):
         goal.value(GOOD)
 
 
+def test_a_metric_that_fails_in_the_second_walk_excludes_the_body_alone(monkeypatch):
+    walks = iter([GOOD, GOOD._replace(power=0.0)])
+    monkeypatch.setattr(trials, "measure_walk", lambda *_: next(walks))
+    thrift = trials.Goal("thrift", 1.0, "walk", measure=lambda walk: walk.speed / walk.power)
+    monkeypatch.setitem(trials.GOALS, "thrift", thrift)
+    outcome = evaluate(Trial.of("walk", {}, "thrift", BUDGET, 100), generate(6, 3), -math.inf)
+    assert outcome.reason == "refused: metric thrift: float division by zero"
+
+
+def test_a_task_without_a_gait_is_refused():
+    with pytest.raises(ValueError, match="^task recover: expected one that prescribes a gait$"):
+        measure_walk(generate(6, 3), "recover", Round({}, (0,), 10))
+
+
 def test_the_second_evaluation_is_longer_on_other_seeds_and_ground():
     trial = Trial.of("stairs", {"rise": 0.1, "terrain_seed": 4}, "progress", BUDGET, 100)
     assert trial.first == ({"rise": 0.1, "terrain_seed": 4}, (0,), 100)

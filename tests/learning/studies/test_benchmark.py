@@ -490,18 +490,24 @@ def test_a_track_is_run_and_resumed(tmp_path):
 def test_the_table_is_refused_where_tables_of_runs_are_edited(tmp_path, name, table, changes, line):
     shutil.copy(COMMITTED / benchmark.SCORES, tmp_path)
     shutil.copytree(COMMITTED / name, tmp_path / name)
-    committed_scores = benchmark.read(tmp_path)
     assert benchmark.text(tmp_path) == benchmark.text(COMMITTED)
     path = tmp_path / name / table
     rows = csv_files.read(path)
     csv_files.write(path, list(rows[0]), [rows[0] | changes, *rows[1:]])
     with refused(f"{path}: damaged: {line}", begins=True):
         benchmark.text(tmp_path)
-    if table == results.RUNS:  # a run may use what an algorithm without a declaration learns from
-        scores = committed_scores["samples", "xqc"]
-        undeclared = [score._replace(notes=results.UNKNOWN_SOURCE) for score in scores]
-        benchmark.write(tmp_path, "samples", "xqc", undeclared)
-        assert results.UNKNOWN_SOURCE in benchmark.text(tmp_path)
+
+
+def test_an_algorithm_without_a_declaration_may_use_any_source(tmp_path):
+    shutil.copy(COMMITTED / benchmark.SCORES, tmp_path)
+    shutil.copytree(COMMITTED / "samples-xqc", tmp_path / "samples-xqc")
+    path = tmp_path / "samples-xqc" / results.RUNS
+    rows = csv_files.read(path)
+    csv_files.write(path, list(rows[0]), [row | {"sources": '["a policy"]'} for row in rows])
+    scores = benchmark.read(tmp_path)["samples", "xqc"]
+    undeclared = [score._replace(notes=results.UNKNOWN_SOURCE) for score in scores]
+    benchmark.write(tmp_path, "samples", "xqc", undeclared)
+    assert results.UNKNOWN_SOURCE in benchmark.text(tmp_path)
 
 
 @pytest.mark.parametrize("name", [f"{division}-{learner}" for division, learner in benchmark.read(COMMITTED)])

@@ -289,7 +289,7 @@ def test_a_study_is_found_in_the_current_folder(tmp_path):
     programs.refused(done, "arc-suite study: --shard=6/7: no run, as the study has 6\n")
 
 
-def test_a_study_is_submitted_where_slurm_is(tmp_path, monkeypatch):
+def test_submit_without_slurm_is_refused(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     done = programs.run("-m", "arc_suite", "study", "top-ppo", "--submit=2", "--hours=1", cwd=tmp_path)
     line = "--submit: SLURM's sbatch is not here; --jobs runs processes on this machine\n"
