@@ -2,6 +2,7 @@
 
 import configparser
 import functools
+import os
 import pathlib
 import re
 import subprocess
@@ -190,6 +191,9 @@ def test_modules_of_the_current_folder_come_last(tmp_path):
 )
 def test_without_an_extra_a_line_says_what_to_install(tmp_path, monkeypatch, module, extra, command, needed):
     monkeypatch.chdir(tmp_path)
+    sbatch = tmp_path / "sbatch"  # SLURM's, which is asked for before the extra
+    sbatch.touch(mode=0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
     program, *flags = command.split()
     line = f"arc-suite {program}: {needed}: {programs.install(extra)} (No module named '{module}')\n"
     programs.refused(programs.without(module, tmp_path, program, *flags), line)

@@ -32,6 +32,7 @@ ELSEWHERE |= {
     "coming_from_dm_control",
     "clients",
     "doors",
+    "evolving",
     "first_steps",
     "gpu",
     "imported",
