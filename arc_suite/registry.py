@@ -17,7 +17,7 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from arc_suite import checks, files, parsers
 from arc_suite.arenas import ARENAS, Arena, ground_text
@@ -61,6 +61,8 @@ BENCHMARKING = (
     *(("queen", "steer"), ("tick", "steer"), ("leaper", "steer")),
     *(("tick", "rough"), ("queen", "gaps"), ("tick", "navigate")),
 )
+
+_Value = TypeVar("_Value")
 
 SETTINGS_OF_EVERY_TASK = ("time_limit", "arena", "random", "on_divergence")
 
@@ -553,6 +555,20 @@ def find(kind: str, name: str, suite: Mapping[str, Any]) -> Any:
     if isinstance(entry, str):
         return checks.import_object(entry, f"{kind} {bare_name(name)!r}: cannot import")
     return entry
+
+
+def find_instance(kind: str, name: str, suite: Mapping[str, Any], value_class: type[_Value]) -> _Value:
+    """Return the value of a name after a check of its class; arguments are as of `find`.
+
+    Raises:
+        ValueError: as `find`, or a value of another class.
+    """
+    value = find(kind, name, suite)
+    if not isinstance(value, value_class):
+        expected = value_class.__name__
+        article = "an" if expected[0] in "AEIOU" else "a"
+        raise ValueError(f"{kind} {bare_name(name)!r}: expected {article} {expected}, got {checks.preview(value)}")
+    return value
 
 
 def find_entry(kind: str, name: str, suite: Mapping[str, Any]) -> Any:

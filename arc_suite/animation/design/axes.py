@@ -58,10 +58,7 @@ def axis_of(name: str) -> Axis:
     Raises:
         ValueError: an unknown name, or no axis.
     """
-    axis = registry.find("axis", name, AXES)
-    if not isinstance(axis, Axis):
-        raise ValueError(f"axis {registry.bare_name(name)!r}: expected an Axis, got {checks.preview(axis)}")
-    return axis
+    return registry.find_instance("axis", name, AXES, Axis)
 
 
 class Map(NamedTuple):

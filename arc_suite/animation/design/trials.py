@@ -101,10 +101,7 @@ def goal_of(name: str) -> Goal:
     Raises:
         ValueError: an unknown name, or no goal.
     """
-    goal = registry.find("goal", name, GOALS)
-    if not isinstance(goal, Goal):
-        raise ValueError(f"goal {registry.bare_name(name)!r}: expected a Goal, got {checks.preview(goal)}")
-    return goal
+    return registry.find_instance("goal", name, GOALS, Goal)
 
 
 class Round(NamedTuple):

@@ -119,20 +119,25 @@ def test_axes_that_do_not_fit_are_one_line(names):
 NEGATIVE = Axis(lambda body: -1.0, edges=(0.0,))
 
 
+def test_axes_of_one_name_are_refused(monkeypatch):
+    monkeypatch.setattr(axes, "axis_of", {"legs": AXES["legs"], "there:legs": AXES["legs"]}.get)
+    with refused("map: expected one or two different axes of legs, links, height, width, ", begins=True):
+        Map.of(["legs", "there:legs"], ROBOTS["tick"], 0.1)
+
+
 @pytest.mark.parametrize(
-    ("names", "message"),
+    ("name", "message"),
     [
-        (["negative"], "axis negative: expected a value above 0 of tick, got -1"),
-        (["legs", "there:legs"], "map: expected one or two different axes of legs, links, height, width, "),
-        (["unknown"], "unknown axis 'unknown' "),
+        ("negative", "axis negative: expected a value above 0 of tick, got -1"),
+        ("unknown", "unknown axis 'unknown' "),
+        ("number", "axis 'number': expected an Axis, got 7"),
     ],
 )
-def test_axes_of_others_are_checked(monkeypatch, names, message):
-    monkeypatch.setattr(axes, "axis_of", {"negative": NEGATIVE, "legs": AXES["legs"], "there:legs": AXES["legs"]}.get)
-    if names == ["unknown"]:
-        monkeypatch.undo()
+def test_axes_of_others_are_checked(monkeypatch, name, message):
+    monkeypatch.setitem(AXES, "negative", NEGATIVE)
+    monkeypatch.setitem(AXES, "number", 7)
     with refused(message, begins=True):
-        Map.of(names, ROBOTS["tick"], 0.1)
+        Map.of([name], ROBOTS["tick"], 0.1)
 
 
 def test_an_axis_without_a_finite_value_is_one_line(monkeypatch):

@@ -53,6 +53,12 @@ def test_a_metric_that_fails_in_the_second_walk_excludes_the_body_alone(monkeypa
     assert outcome.reason == "refused: metric thrift: float division by zero"
 
 
+def test_what_is_no_goal_is_refused(monkeypatch):
+    monkeypatch.setitem(trials.GOALS, "number", 7)
+    with pytest.raises(ValueError, match="^goal 'number': expected a Goal, got 7$"):
+        trials.goal_of("number")
+
+
 def test_a_task_without_a_gait_is_refused():
     with pytest.raises(ValueError, match="^task recover: expected one that prescribes a gait$"):
         measure_walk(generate(6, 3), "recover", Round({}, (0,), 10))
