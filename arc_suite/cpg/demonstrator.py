@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from arc_suite import checks, registry, usage
-from arc_suite.cpg.law import proprioception, read_blocks, restart_where
+from arc_suite.cpg.law import check_blocks, proprioception, read_blocks, restart_where
 from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.selection import ignored_commands, law, preset_of, suited_preset
 from arc_suite.envs import trees
@@ -66,12 +66,14 @@ class Demonstrator:
             UserWarning: the task gives commands that the law of the preset does not read.
 
         Raises:
-            ValueError: no preset suits the task, an unknown name, a value out of range, a preset that does not fit, a
-                task with `sensors_only`, or a body that cannot walk by any preset, as its feet hang far above the
-                floor; or a run learns that declares no demonstrator as its source.
+            ValueError: no preset suits the task, an unknown name, a value out of range, a preset that does not fit or
+                whose law reads a block of the observation that the task lacks, a task with `sensors_only`, or a body
+                that cannot walk by any preset, as its feet hang far above the floor; or a run learns that declares no
+                demonstrator as its source.
         """
         usage.add_source(usage.DEMONSTRATOR)
         body, body_task = _body_and_task(task)
+        has_task = body_task is not None
         if body_task is None:
             body_task, _ = prepare_task(body, "walk")
         if has_active(body_task, SensorsOnly):
@@ -85,6 +87,8 @@ class Demonstrator:
             if flaws:
                 raise ValueError(f"{body.name} cannot walk: {flaws[0].text}")
         self.law = law(body_task, parameters)
+        if has_task:  # a demonstrator of a body may act in any task
+            check_blocks(body_task.blocks, self.law.reads)
         if preset is not None:
             _warn_of_ignored_commands(body_task, name, ignored_commands(body_task, self.law))
         self._task = body_task

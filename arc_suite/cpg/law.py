@@ -7,7 +7,7 @@ a preset may add feedforward torques: harmonics of the leg's phase, and steering
 A law of a demonstrator is a pure function `(state, observation) -> (state, actions)`; see `Law`.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -244,8 +244,18 @@ def read_blocks(observation, names: Iterable[str], joints: int, parts: int | Non
     if parts is not None and forces_shape and forces_shape[-1] != 6 * parts:
         forces = f"{forces_shape[-1] / 6:g}"
         raise ValueError(f"observation: expected contact forces of {parts} rigid bodies, got {forces}")
-    for name in names:
-        if name not in observation:
-            example = _EXAMPLES.get(name, "steer")
-            raise ValueError(f"observation: expected a block {name}, as the task {example} has (--task {example})")
+    check_blocks(observation, names)
     return {name: np.asarray(observation[name], dtype=float) for name in names}
+
+
+def check_blocks(blocks: Container[str], names: Iterable[str]) -> None:
+    """Check that the names of an observation's blocks include `names`.
+
+    Raises:
+        ValueError: a name is missing.
+    """
+    missing_names = [name for name in names if name not in blocks]
+    if missing_names:
+        name = max(missing_names, key=lambda name: name in _EXAMPLES)  # its task has commands, too
+        example = _EXAMPLES.get(name, "steer")
+        raise ValueError(f"observation: expected a block {name}, as the task {example} has (--task {example})")

@@ -16,6 +16,8 @@ from arc_suite.robots import ROBOTS
 
 # In the body's own units.
 NEEDS_COMMAND = "a block command, as the task steer has (--task steer)"
+NEEDS_SCAN = "a block scan, as the task rough has (--task rough)"
+NEEDS_GOAL = "a block goal, as the task navigate has (--task navigate)"
 COMMANDS = np.transpose(
     [
         (1.0, 0.4, -0.7, 0.0, 0.0, 0.0, 0.0, 0.7, 0.6, 0.0),  # forward
@@ -138,14 +140,18 @@ def test_who_sees_crosses_trenches(robot):
 @pytest.mark.parametrize(
     ("task", "presets", "needs"),
     [
-        ("steer", ["sighted"], "a block scan, as the task rough has (--task rough)"),
-        ("steer", ["planned"], "a block goal, as the task navigate has (--task navigate)"),
-        ("walk", ["steered", "surefooted", "sighted", "planned", "balanced"], NEEDS_COMMAND),
+        ("steer", ["sighted"], NEEDS_SCAN),
+        ("steer", ["planned"], NEEDS_GOAL),
+        ("walk", ["steered", "surefooted", "balanced"], NEEDS_COMMAND),
+        ("walk", ["sighted", "leaping"], NEEDS_SCAN),  # a task with a scan has commands, too
+        ("rough", ["planned"], NEEDS_GOAL),
     ],
 )
 def test_what_a_preset_needs_is_one_line(task, presets, needs):
     environment = arc_suite.load("leaper", task)  # Leaper has them all
     for preset in presets:
+        with refused(f"observation: expected {needs}"):
+            Demonstrator(environment, preset)
         with refused(f"observation: expected {needs}"):
             Demonstrator("leaper", preset)(environment.reset())
 

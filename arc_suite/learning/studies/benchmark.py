@@ -121,8 +121,9 @@ def check_budget(run: Run, steps: int) -> None:
     max_steps = int(MAX_OVERRUN * expected_steps)
     if steps > max_steps:
         cure = "yield a slice at the latest at context.next_evaluation; steps of context.count_steps count, too"
+        again = f"then remove the folder {run.name} of the runs, and train again"
         raise ValueError(
-            f"run {run.name}: expected {expected_steps:,} steps, at most {max_steps:,}, made {steps:,}; {cure}"
+            f"run {run.name}: expected {expected_steps:,} steps, at most {max_steps:,}, made {steps:,}; {cure}; {again}"
         )
 
 
