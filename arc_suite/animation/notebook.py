@@ -63,7 +63,7 @@ def show(
         RenderingUnavailable: a film, and no OpenGL here.
     """
     setup = _setup_of(environment)
-    played_environment = setup.load()
+    played_environment = setup.load(checks.seed(seed))
     actor = policies.acting(policy, played_environment.task.definition)
     if steps is None:
         steps = _FILM_STEPS if film else _PAGE_STEPS

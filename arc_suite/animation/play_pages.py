@@ -189,11 +189,12 @@ def largest_kick(body: Body) -> float:
 
 
 def _grounds(arena: str | None) -> dict[str, str]:
-    """Return the arenas of a page by the names that it shows, a further one first."""
-    if arena is None or arena in GROUNDS.values():
+    """Return the arenas of a page by the names that it shows, the one that is asked for first."""
+    if arena is None:
         return GROUNDS
     word = registry.arena_word(arena)
-    name = ground_text.name_of(word) if ground_text.is_text(word) else word
+    names_of_grounds = {ground: name for name, ground in GROUNDS.items()}
+    name = names_of_grounds.get(word) or (ground_text.name_of(word) if ground_text.is_text(word) else word)
     return {name: word, **GROUNDS}
 
 

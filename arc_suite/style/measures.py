@@ -113,12 +113,13 @@ def report(tracks: Sequence[Track]) -> dict[str, Any]:
     """Return the metrics of a policy, over tracks of one setup.
 
     Returns:
-        `return` and `length` as summaries of the evaluation protocol, `progress` as summaries by name, and
-        under `metrics`, by name, the `unit`, the value `prescribed` or None, the summary of the `robot`,
-        and of each of the `legs`.
+        `seeds` of the episodes, `return` and `length` as summaries of the evaluation protocol, `progress` as summaries
+        by name, and under `metrics`, by name, the `unit`, the mean of the value `prescribed` or None, the summary of
+        the `robot`, and of each of the `legs`.
     """
     measured = [measure(track) for track in tracks]
     return {
+        "seeds": [track.seed for track in tracks],
         "return": evaluation.summary([track.rewards.sum() for track in tracks]),
         "length": evaluation.summary([len(track.times) for track in tracks]),
         "progress": {
@@ -127,7 +128,7 @@ def report(tracks: Sequence[Track]) -> dict[str, Any]:
         "metrics": {
             name: {
                 "unit": metric.unit,
-                "prescribed": _prescribed_value(metric, tracks[0]),
+                "prescribed": _prescribed_value(metric, tracks),
                 "robot": evaluation.summary([measurement[name].value for measurement in measured]),
                 "legs": {
                     leg: evaluation.summary([measurement[name].legs[leg] for measurement in measured])
@@ -140,7 +141,10 @@ def report(tracks: Sequence[Track]) -> dict[str, Any]:
     }
 
 
-def _prescribed_value(metric: Metric, track: Track) -> float | None:
-    """Return the prescribed value of a metric, or None."""
-    value = metric.prescribed(track) if metric.prescribed else None
+def _prescribed_value(metric: Metric, tracks: Sequence[Track]) -> float | None:
+    """Return the mean over tracks of the value that is prescribed for a metric, or None."""
+    if not metric.prescribed:
+        return None
+    values = [metric.prescribed(track) for track in tracks]
+    value = values[0] if len(set(values)) == 1 else float(np.mean(values))
     return None if value is None or np.isnan(value) else value

@@ -364,6 +364,19 @@ def test_what_a_page_holds_of_a_body(monkeypatch):
     assert play_pages.creature(ROBOTS["leaper"], "ppo")["task"]["direction"] is None  # and no keys for it
 
 
+@pytest.mark.parametrize(
+    ("arena", "names"),
+    [
+        (None, ["level", "bumps", "slopes"]),
+        ("flat", ["level", "bumps", "slopes"]),
+        ("bumps", ["bumps", "level", "slopes"]),
+        ("stairs", ["stairs", "level", "bumps", "slopes"]),
+    ],
+)
+def test_a_page_begins_on_the_ground_that_is_asked_for(arena, names):
+    assert list(play_pages.creature(ROBOTS["leaper"], arena=arena)["grounds"]) == names
+
+
 def creatures_of(page):
     """What a page holds of its bodies, with the heights that they share in place."""
     data = data_of(page)

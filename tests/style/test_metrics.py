@@ -51,6 +51,14 @@ def test_what_the_task_prescribes_is_what_a_perfect_walk_does():
     assert asked == set(prescribed) - {"speed", "stride_length"}
 
 
+def test_a_report_has_the_mean_of_what_episodes_prescribe():
+    slow, fast = synthetic()._replace(seed=7), synthetic()._replace(seed=9, target_velocity=0.9)
+    figures = style.report([slow, fast])
+    assert figures["seeds"] == [7, 9]
+    assert figures["metrics"]["speed"]["prescribed"] == pytest.approx(0.7)
+    assert figures["metrics"]["duty_factor"]["prescribed"] == 0.5
+
+
 def test_a_report_sums_tracks_up():
     figures = style.report([synthetic(), synthetic(speed=0.25, dragged=1)])
     assert figures["return"].mean == 1.5 * 160

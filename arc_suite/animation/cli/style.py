@@ -101,8 +101,6 @@ def main() -> None:
         json_content.update(
             task=any_setup.task,
             task_kwargs=any_setup.task_kwargs,
-            episodes=FLAGS.episodes,
-            seed=FLAGS.seed,
             robots=reports,
             versions=versions.dependency_versions(),
         )

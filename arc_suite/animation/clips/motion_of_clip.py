@@ -5,16 +5,9 @@ import numpy as np
 from arc_suite import motions
 from arc_suite.animation.clips import secondary
 from arc_suite.animation.clips.clips import Clip
-from arc_suite.animation.clips.foot_contacts import (
-    LIFT_OFF,
-    MIN_RISE,
-    MIN_RISE_IN_GESTURE,
-    TOUCH_DOWN,
-    FootContact,
-    find_foot_contacts,
-)
+from arc_suite.animation.clips.foot_contacts import MIN_RISE, MIN_RISE_IN_GESTURE, FootContact, find_foot_contacts
 from arc_suite.animation.clips.planting import slip
-from arc_suite.animation.clips.root_motion import put_on_root
+from arc_suite.animation.clips.root_motion import ClipMotion, put_on_root
 from arc_suite.motions import gait_transfer
 from arc_suite.motions.ground_poses import ground_poses, integrate_twist, relative_pose, twist_to
 from arc_suite.robots.spec import Body
@@ -32,13 +25,7 @@ def motion_of_clip(body: Body, clip: Clip) -> motions.Motion:
         quaternions=poses[:, 3:7],
         angles=poses[:, 7:],
     )
-    cycle = clip.motion.seconds
-    min_rise = MIN_RISE_IN_GESTURE
-    if clip.cycles:
-        cycle = clip.motion.seconds / clip.cycles
-        min_rise = MIN_RISE
-    heights = motion.soles[..., 2] * motion.standing_height
-    _, planted = find_foot_contacts(clip.motion, body, heights, cycle, clip.loops, min_rise)
+    _, planted = _find_contacts(body, clip.motion, motion, clip.cycles)
     return motion._replace(planted=planted)
 
 
@@ -58,23 +45,32 @@ def clip_of_motion(body: Body, motion: motions.Motion, fps: float) -> Clip:
     root = integrate_twist(twist, np.arange(motion.frames) / motion.frame_rate)
     clip_motion = put_on_root(1.0 / motion.frame_rate, poses, root, torso_on_root=relative_pose(root, torso))
     clip_motion = clip_motion._replace(twist=twist)
+    cycles = gait_transfer.count_cycles(motion)
+    contacts, _ = _find_contacts(body, clip_motion, motion, cycles)
     return Clip(
         name=motion.name,
         motion=clip_motion,
         loops=motion.loops,
-        cycles=gait_transfer.count_cycles(motion),
-        foot_contacts=tuple(_find_contacts(body, motion)),
+        cycles=cycles,
+        foot_contacts=tuple(contacts),
         feet=body.foot_names,
         slip=slip(body, clip_motion) if motion.loops else None,
         swings=secondary.swing_bones(body, clip_motion, motion.loops),
     )
 
 
-def _find_contacts(body: Body, motion: motions.Motion) -> list[FootContact]:
-    """Return the foot contact events of a motion in the order of time."""
-    changes = np.diff(motion.planted.astype(int), axis=0)
-    contacts = []
-    for frame, leg in np.argwhere(changes).tolist():
-        event = TOUCH_DOWN if changes[frame, leg] > 0 else LIFT_OFF
-        contacts.append(FootContact(body.foot_names[leg], event, frame + 1, time=(frame + 1) / motion.frame_rate))
-    return contacts
+def _find_contacts(
+    body: Body, clip_motion: ClipMotion, motion: motions.Motion, cycles: int
+) -> tuple[list[FootContact], np.ndarray]:
+    """Return the foot contact events of a motion in the order of time, and the feet in stance, (samples, feet).
+
+    Args:
+        body: the spec.
+        clip_motion: the motion of a clip.
+        motion: the same as a motion of the core.
+        cycles: cycles of the gait; 0 for a gesture.
+    """
+    heights = motion.soles[..., 2] * motion.standing_height  # m
+    cycle = clip_motion.seconds / (cycles or 1)
+    min_rise = MIN_RISE if cycles else MIN_RISE_IN_GESTURE
+    return find_foot_contacts(clip_motion, body, heights, cycle, motion.loops, min_rise)

@@ -19,6 +19,8 @@ from arc_suite.policies.protocol import Policy
 from arc_suite.robots.gaits import Pace
 from arc_suite.tasks import Task
 from arc_suite.tasks.fitting import velocity_units
+from arc_suite.tasks.modified_task import has_active
+from arc_suite.tasks.modifiers import Kicks, Pushes
 
 _SETTLE_STEPS = 200  # control steps, after which starts and changes of command are forgotten
 _SAG_STEPS = 700  # control steps, after which a leg without motors hardly sags any further
@@ -108,10 +110,14 @@ class Recorder:
             preset: preset of the policy; None for the one that suits the task and the body.
 
         Raises:
-            ValueError: a policy or preset that does not fit.
+            ValueError: a policy or preset that does not fit, or a task with kicks or pushes.
             OSError: a file cannot be read.
         """
         task = setup.definition
+        if has_active(task, Kicks) or has_active(task, Pushes):
+            raise ValueError(
+                f"task {setup.kind.name}: expected kicks=0 and force=0, as clips show bodies that nothing disturbs"
+            )
         check_preset(policy, preset)
         named_policy(policy, setup.body, preset, task=task)  # raises errors of the policy, which are none of a clip
         self.body = setup.body

@@ -63,7 +63,7 @@ def record(
         A pose for every substep, and the first one.
 
     Raises:
-        ValueError: the episode ends before.
+        ValueError: the episode ends before, or something else than its controls moves the body, such as a kick.
     """
     command_at_step = dict(commands)
     model = environment.physics.model.ptr
@@ -93,6 +93,8 @@ def record(
     controls = np.repeat(control_of_step[settle:], scene.substeps, axis=0)
     states, _ = rollout.rollout(model, mujoco.MjData(model), first_state, controls[None], initial_warmstart=warmstart)
     later_qpos = states[0, :, 1 : 1 + model.nq]  # in a full state, time comes first and then the positions
+    if not np.array_equal(later_qpos[-1], data.qpos):
+        raise ValueError("it is moved by more than its controls, as by kicks, which clips leave out")
     qpos = np.concatenate([first_qpos, later_qpos])
     return Recording(model.opt.timestep, scene.substeps, pose(qpos, scene.layout))
 

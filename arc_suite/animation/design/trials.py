@@ -263,8 +263,9 @@ def _walk_episode(environment: Environment, policy: Policy, seed: int, steps: in
             work = energy.after(work, torques, heat, efforts, readings.joint_angles)
     progress = environment.task.progress  # the task's metrics of the episode
     displacement = float(readings.torso_position[0]) - start_x
-    seconds = steps * control_timestep  # of an episode without a fall
-    tracking = progress.get("tracking", math.nan) * steps_taken / steps
+    counted_steps = steps if fell else steps_taken  # a fall counts as standing still; the time limit ends both
+    seconds = counted_steps * control_timestep
+    tracking = progress.get("tracking", math.nan) * steps_taken / counted_steps
     if "distance" in progress or math.isnan(tracking):
         achieved = displacement / (task.parameters.target_velocity * seconds)
     else:

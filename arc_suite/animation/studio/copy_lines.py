@@ -31,12 +31,13 @@ def spec_file_name(body: Body) -> str:
 def python_lines(sketch: Sketch) -> str:
     """Return Python that opens the same environment and policy.
 
-    A body from a file is read from `spec_file_name`, ground from the file that it came from.
+    A body from a file is read from its saved spec, `spec_file_name`, ground from the file that it came from.
     """
-    code, names_by_package = _body_code(sketch)
+    code, names_of_body = _body_code(sketch)
+    policy_code, names_of_policy = _policy_code(sketch)
+    names_by_package = {**names_of_policy, **names_of_body}
     settings = _settings_with_files(sketch, make_body(sketch))
     settings_argument = f", {settings!r}" if settings else ""
-    preset = chosen_preset(sketch)
     imports = "".join(
         f"from {package} import {', '.join(names)}\n" for package, names in names_by_package.items() if names
     )
@@ -44,8 +45,18 @@ def python_lines(sketch: Sketch) -> str:
         f"import arc_suite\n{imports}\n"
         f"body = {code}\n"
         f'environment = arc_suite.load(body, "{sketch.task}"{settings_argument})\n'
-        f"policy = policies.policy({sketch.policy!r}, body, {preset!r}, task=environment.task.definition)\n"
+        f"policy = {policy_code}\n"
     )
+
+
+def _policy_code(sketch: Sketch) -> tuple[str, dict[str, list[str]]]:
+    """Return a Python expression that makes the policy of `creature.load_policy`, and names to import by package."""
+    preset = chosen_preset(sketch)
+    task = "environment.task.definition"
+    if sketch.policy == "cpg":
+        code = f"paced_demonstrator({task}, {preset!r}, {sketch.speed!r})"
+        return code, {"arc_suite.animation.pacing": ["paced_demonstrator"]}
+    return f"policies.policy({sketch.policy!r}, body, {preset!r}, task={task})", {"arc_suite": ["policies"]}
 
 
 def _body_code(sketch: Sketch) -> tuple[str, dict[str, list[str]]]:
@@ -63,10 +74,11 @@ def _body_code(sketch: Sketch) -> tuple[str, dict[str, list[str]]]:
     elif sketch.source in ROBOTS:
         robots_names.append("ROBOTS")
         code = f'ROBOTS["{sketch.source}"]'
+    elif sketch.source == FILE:
+        return f'spec_files.load_body("{spec_file_name(make_body(sketch))}")', {"arc_suite.robots": ["spec_files"]}
     else:
-        spec_name = spec_file_name(original_body) if sketch.source == FILE else sketch.source
         robots_names.append("spec_files")
-        code = f'spec_files.load_body("{spec_name}")'
+        code = f'spec_files.load_body("{sketch.source}")'
     changes = shape_changes(sketch, original_body)
     if changes:
         arguments = ", ".join(f"{name}={value!r}" for name, value in changes.items())
@@ -75,7 +87,7 @@ def _body_code(sketch: Sketch) -> tuple[str, dict[str, list[str]]]:
     looks = visual_changes(sketch, original_body)
     if looks:
         code = f"{code}.replace({', '.join(f'{name}={value!r}' for name, value in looks.items())})"
-    return code, {"arc_suite": ["policies"], "arc_suite.bodies": bodies_names, "arc_suite.robots": robots_names}
+    return code, {"arc_suite.bodies": bodies_names, "arc_suite.robots": robots_names}
 
 
 def command_line(sketch: Sketch) -> str:

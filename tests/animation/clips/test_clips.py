@@ -561,6 +561,13 @@ def test_the_recording_is_the_episode_to_the_bit():
     np.testing.assert_array_equal(recording.poses[:: recording.substeps], poses[9:])
 
 
+@pytest.mark.parametrize("setting", ["kicks", "force"])
+def test_a_recording_of_a_body_that_is_pushed_is_refused(setting):
+    environment = arc_suite.load("tick", "steer", {"random": 0, setting: 0.5})
+    with refused("it is moved by more than its controls, as by kicks, which clips leave out"):
+        recordings.record(environment, policy("cpg", "tick", "steered"), 10, 130)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -573,6 +580,8 @@ def test_the_recording_is_the_episode_to_the_bit():
         slow({"names": ["walk"], "policy": "zero"}, "tick, clip walk: the pose does not return within"),
         slow({"names": ["walk"], "policy": "random"}, "tick, clip walk: "),
         ({"names": ["walk"], "setup": SHORT}, "tick, clip walk: the episode ends after 20"),
+        ({"names": ["walk"], "setup": Setup.of("tick", "shoved")}, "task shoved: expected kicks=0 and force=0, as "),
+        ({"names": ["walk"], "setup": Setup.of("tick", "steer", {"force": 0.1})}, "task steer: expected kicks=0 and "),
     ],
 )
 def test_errors_are_one_line(arguments, message):

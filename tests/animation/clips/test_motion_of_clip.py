@@ -29,6 +29,20 @@ def test_loop_turns_by_its_command(tmp_path):
     assert 0.5 < motion.planted.mean() < 0.7  # the duty factor of the gait
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["walk", "attack"])
+def test_a_motion_file_has_the_foot_contacts_of_its_clip(name, tmp_path):
+    file = str(tmp_path / f"{name}.npz")
+    (clip,) = animation.animate("tick", file, name)
+    (copy,) = animation.animate("tick", tmp_path / "copy.glb", file)
+    assert len(copy.foot_contacts) == len(clip.foot_contacts)
+    for contact in copy.foot_contacts:
+        same = [other.time for other in clip.foot_contacts if contact[:2] == other[:2]]
+        apart = abs(np.array(same) - contact.time)
+        apart = np.minimum(apart, clip.motion.seconds - apart)  # over the seam
+        assert apart.min() < 1.01 / 60  # events of the clip are at substeps, those of the file at frames
+
+
 @pytest.mark.parametrize(("name", "motion"), [("hit_left", "stagger_left"), ("limp", "limp_walk")])
 def test_additive_clip_is_no_motion(name, motion, tmp_path):
     line = f"clips: {name} is added to another clip, and is no motion by itself: take {motion}"

@@ -9,6 +9,7 @@ from arc_suite.animation.design import trials
 from arc_suite.animation.design.genes import Budget
 from arc_suite.animation.design.trials import GOALS, Round, Trial, WalkMeans, evaluate, exclusion_reason, measure_walk
 from arc_suite.bodies.generator import generate
+from arc_suite.envs.setup import Setup
 
 BUDGET = Budget(12.0, 1.5)
 GOOD = WalkMeans(0.5, 0.9, math.nan, 1.5, 6.0, 0.0)
@@ -84,6 +85,16 @@ def test_a_body_walks_and_challenges_an_elite():
     assert evaluate(trial, "no body: too large", 0.0) == ("no body: too large", None, None)
     high = body.replace(torso=body.torso.replace(standing_height=0.7))
     assert evaluate(trial, high, 0.0).reason.startswith("unsound: feet hang")
+
+
+@pytest.mark.parametrize("task", ["walk", "steer"])
+def test_an_episode_that_ends_by_its_time_limit_counts_its_steps_alone(task):
+    """`walk` has a target speed, `steer` a command that it tracks."""
+    body = generate(6, 3)
+    whole = measure_walk(body, task, Round({}, (0,), 100))
+    seconds = 100 * Setup.of(body, task).definition.scene.control_timestep
+    cut = measure_walk(body, task, Round({"time_limit": seconds}, (0,), 200))
+    assert str(cut) == str(whole)  # NaN is not equal to itself
 
 
 def test_the_power_of_servos_is_that_of_their_torques():

@@ -9,6 +9,7 @@ import ground_files
 import imports
 import programs
 import pytest
+from numpy.testing import assert_array_equal
 from refusals import refused
 
 from arc_suite import moved, registry
@@ -22,6 +23,7 @@ from arc_suite.bodies import generator, shaping
 from arc_suite.bodies.families import sound_body
 from arc_suite.bodies.shaping import Shape
 from arc_suite.models.soundness import flaws
+from arc_suite.policies import alone
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec_files import body_from_json, body_to_json, load_body
 
@@ -38,6 +40,7 @@ SKETCHES = {
     "example": Sketch(source="spider", task="stairs", settings='{"difficulty": 0.5}'),
     "random": Sketch(source=RANDOM, seed=7, policy="zero", palette="7"),
     "file": Sketch(source=FILE, file=body_to_json(HIGH)),
+    "shaped file": Sketch(source=FILE, file=body_to_json(HIGH), scale=2.0),
     "without ornaments": Sketch(legs=4, palette="moss", no_ornaments=True),
 }
 
@@ -111,19 +114,23 @@ def test_factors_of_links_that_the_body_lacks_are_ignored():
 @pytest.mark.parametrize("sketch", SKETCHES.values(), ids=SKETCHES)
 def test_python_lines_make_the_same(sketch, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / copy_lines.spec_file_name(sketches.source_body(sketch))).write_text(
-        body_to_json(sketches.source_body(sketch))
-    )
+    body = sketches.make_body(sketch)
+    (tmp_path / copy_lines.spec_file_name(body)).write_text(body_to_json(body))
     made = {}
     lines = copy_lines.python_lines(sketch)
     imported = re.findall(r"^from (\S+) import (.+)$", lines, re.MULTILINE)
     paths = {f"{package}.{name}" for package, names in imported for name in names.split(", ")}
     assert not paths & moved.MOVED.keys()
     exec(lines, made)
-    assert made["body"] == sketches.make_body(sketch)
+    assert made["body"] == body
     assert made["environment"].task_kwargs == sketches.make_setup(sketch).task_kwargs
-    policy = made["policy"]
-    assert policy.act(made["environment"].reset().observation, 0.0).shape[-1:] == (len(made["body"].joint_names),)
+    creature = open_creature(sketch)
+    act = alone(made["policy"])
+    timestep = creature.environment.reset()
+    for _ in range(60):  # a swing of a foot
+        action = act(timestep)
+        assert_array_equal(action, creature.act(timestep))
+        timestep = creature.environment.step(action)
 
 
 @pytest.mark.slow
