@@ -129,8 +129,8 @@ def test_a_run_of_more_steps_than_its_division_gives_has_no_score():
         benchmark.score_results([result([0.0, 0.5], steps=(50_000, 200_000))])
     assert str(caught.value) == (
         "run tick-walk-sac-0: expected 100,000 steps, at most 105,000, made 200,000; yield a slice at the latest at "
-        "context.next_evaluation; steps of context.count_steps count, too; then remove the folder tick-walk-sac-0 of the "
-        "runs, and train again"
+        "context.next_evaluation; steps of context.count_steps count, too; then remove the folder tick-walk-sac-0 of "
+        "the runs, and train again"
     )
 
 
