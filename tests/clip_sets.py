@@ -7,7 +7,7 @@ a run that was interrupted goes on. Remove it when clips change.
 
 Prints for each body the cycles of its loops and the largest seam, how far its start and stop are from walk and idle
 before they are made to meet, the slip of its walk as it is and planted, and what was left out. Lengths are in standing
-heights. Then prints how many bodies have each clip, and the most frequent line of those that are left out. Of `slow`
+heights. `clip_sets.csv` in the folder has these numbers, as committed in `studies`. Then prints how many bodies have each clip, and the most frequent line of those that are left out. Of `slow`
 and `run` it prints speed and cadence as multiples of the walk, and of all paces the duty factor of feet and the share
 of samples in which feet follow the schedule of the gait. Fails if a frame of a clip breaks a bound, a body has no file,
 fewer than 95 % of the random bodies with three joints a leg or more have loops of one cycle, or fewer than 85 % of the
@@ -16,6 +16,7 @@ bodies stop from a pose within 0.08 of the walk's. Bodies with two joints a leg 
 
 import collections
 import concurrent.futures
+import csv
 import functools
 import json
 import os
@@ -173,6 +174,17 @@ def table(left_out_of_body: dict[str, dict[str, str]], others) -> str:
     return "\n".join(["| clip | robots and examples | random bodies | left out, as |", "|---|---|---|---|", *rows])
 
 
+def write_numbers(file: Path, numbers: dict[str, dict[str, float]], left_out_of_body: dict[str, dict[str, str]]):
+    """Write a line for each body: its numbers, and the names of the clips that are left out."""
+    columns = list(dict.fromkeys(key for numbers_of_body in numbers.values() for key in numbers_of_body))
+    with file.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(["body", *columns, "left_out"])
+        for name, numbers_of_body in numbers.items():
+            cells = [f"{numbers_of_body[column]:.5g}" if column in numbers_of_body else "" for column in columns]
+            writer.writerow([name, *cells, " ".join(left_out_of_body[name])])
+
+
 def main(count: str = "100", folder: str = "out/clip_sets") -> int:
     """Measure the bodies, and return the exit status."""
     bodies = [f"random_{seed}" for seed in range(int(count))]
@@ -186,6 +198,7 @@ def main(count: str = "100", folder: str = "out/clip_sets") -> int:
         )
     numbers = {name: numbers for name, (numbers, _) in measurement_of_body.items()}
     left_out_of_body = {name: left_out for name, (_, left_out) in measurement_of_body.items()}
+    write_numbers(Path(folder, "clip_sets.csv"), numbers, left_out_of_body)
     for name in names:
         values_of_body = ", ".join(f"{key} {value:.3g}" for key, value in numbers[name].items())
         missing = [f"no {clip}: {reason}" for clip, reason in left_out_of_body[name].items()]
