@@ -7,11 +7,12 @@ a run that was interrupted goes on. Remove it when clips change.
 
 Prints for each body the cycles of its loops and the largest seam, how far its start and stop are from walk and idle
 before they are made to meet, the slip of its walk as it is and planted, and what was left out. Lengths are in standing
-heights. `clip_sets.csv` in the folder has these numbers, as committed in `studies`. Then prints how many bodies have each clip, and the most frequent line of those that are left out. Of `slow`
-and `run` it prints speed and cadence as multiples of the walk, and of all paces the duty factor of feet and the share
-of samples in which feet follow the schedule of the gait. Fails if a frame of a clip breaks a bound, a body has no file,
-fewer than 95 % of the random bodies with three joints a leg or more have loops of one cycle, or fewer than 85 % of the
-bodies stop from a pose within 0.08 of the walk's. Bodies with two joints a leg often need two cycles.
+heights. `clip_sets.csv` in the folder has these numbers. Then prints how many bodies have each clip, and the most
+frequent line of those that are left out. Of `slow` and `run` it prints speed and cadence as multiples of the walk, and
+of all paces the duty factor of feet and the share of samples in which feet follow the schedule of the gait. Fails if a
+frame of a clip breaks a bound, a body has no file, fewer than 95 % of the random bodies with three joints a leg or more
+have loops of one cycle, or fewer than 85 % of the bodies stop from a pose within 0.08 of the walk's. Bodies with two
+joints a leg often need two cycles.
 """
 
 import collections
