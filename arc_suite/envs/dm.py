@@ -285,6 +285,7 @@ class _Now:
 
     Attributes:
         memory: memory of the present episode; None before the first.
+        earlier_memory: memory before the action of the latest step; None before the first.
         readings: readings of the present state; None if they have to be read from the simulation.
         terms: unweighted terms of the latest reward by name.
     """
@@ -292,6 +293,7 @@ class _Now:
     def __init__(self):
         """Start before the first episode."""
         self.memory = None
+        self.earlier_memory = None
         self.readings = None
         self.terms = {}
 
@@ -486,6 +488,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         """
         action = checked_action(action, self._action_shape)
         memory = self._commands.consume(self.definition, self._now.memory)
+        self._now.earlier_memory = memory
         self._now.memory, inputs = self.definition.before(memory, action)
         # Set in every step, as a copy of the simulation lacks both.
         physics.marker = self.markers
@@ -498,15 +501,19 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
             data.xfrc_applied[self.definition.scene.layout.torso, :3] = inputs.force
 
     def after_step(self, physics):
-        """Read the simulation after the step, and update the memory.
+        """Read the simulation after the step, and update the memory; a step that diverges leaves that of before.
 
         Raises:
             PhysicsError: the physics has diverged, and `on_divergence` is "raise".
         """
-        if physics.divergence is not None and self._on_divergence == "raise":
+        if physics.divergence is None:
+            self._now.readings = self.definition.read(physics.data.ptr)
+            self._now.memory = self.definition.after(self._now.memory, self._now.readings)
+            return
+        self._now.memory = self._now.earlier_memory
+        if self._on_divergence == "raise":
             raise control.PhysicsError(f"{self.body.name}: {physics.divergence}")
         self._now.readings = self.definition.read(physics.data.ptr)
-        self._now.memory = self.definition.after(self._now.memory, self._now.readings)
 
     def get_reward(self, physics):
         """Return the reward of the latest step; `terms` returns its terms from then on."""

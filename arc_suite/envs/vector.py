@@ -295,9 +295,10 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
             usage.count_steps(int(np.count_nonzero(is_stepping)))
         has_diverged = self.batch.step(task.scene.substeps, is_stepping)
         readings = task.read(self.batch.data)
-        memory = trees.where(is_stepping, task.after(memory_with_action, readings), earlier_memory)
+        has_moved = is_stepping & ~has_diverged  # a step that diverges leaves no trace in metrics and curriculum
+        memory = trees.where(has_moved, task.after(memory_with_action, readings), earlier_memory)
         self._memory = memory
-        self._steps += 1
+        self._steps += is_stepping
 
         raw_terms = task.terms(memory, readings)
         if has_diverged.any():
@@ -315,11 +316,11 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         info = {}
         has_step_info = is_stepping  # environments whose terms and metrics are in the info itself
         if self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
-            is_starting = self._ended
             has_step_info = is_stepping & ~self._ended
-            final_info = self._step_info(is_starting, has_diverged) | self._privileged_info(is_starting)
-            final = {"final_obs": _to_objects(observation, is_starting), "final_info": final_info}
-            info |= _with_masks(final, is_starting)
+            final_info = self._step_info(self._ended, has_diverged) | self._privileged_info(self._ended)
+            final = {"final_obs": _to_objects(observation, self._ended), "final_info": final_info}
+            info |= _with_masks(final, self._ended)
+            is_starting = is_starting | self._ended  # a snapshot of another mode has ends that wait for a start
         info |= self._step_info(has_step_info, has_diverged)
         if is_starting.any():
             self._start_episodes(is_starting, observation)

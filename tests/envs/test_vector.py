@@ -400,3 +400,39 @@ def test_bad_arguments_are_one_line_errors(kwargs, message, monkeypatch):
         make(**kwargs)
     gc.collect()
     assert not ignored  # where Gymnasium closes what was never made
+
+
+def test_time_at_rest_does_not_count():
+    environment = VectorEnv("queen", "walk", 2, 1, "Disabled", task_kwargs={"time_limit": 0.5, "random": 0})  # 10 steps
+    environment.reset()
+    own_steps = np.zeros(2, int)
+    rests = {1: [True, False], 5: [False, True]}  # by call: who rests from then on
+    for call in range(11):
+        if call in rests:
+            environment.rest(np.array(rests[call]))
+        at_rest = environment._resting.copy()
+        truncated = environment.step(np.zeros((2, 18)))[3]
+        own_steps += ~at_rest
+        assert not truncated.any()
+    assert own_steps.tolist() == [7, 5]
+    assert environment.snapshot()["steps"].tolist() == [7, 5]
+    ends = [environment.step(np.zeros((2, 18)))[3].tolist() for _ in range(3)]
+    assert ends == [[False, False], [False, False], [True, False]]
+
+
+def test_ends_of_another_mode_start_in_the_next_step():
+    settings = {"time_limit": 0.5, "random": 0}  # 10 steps
+    donor = VectorEnv("queen", "walk", 2, 1, "Disabled", task_kwargs=settings)
+    donor.reset()
+    for _ in range(9):
+        donor.step(np.zeros((2, 18)))
+    arrays = donor.snapshot()
+    arrays["steps"][1] = 10
+    arrays["ended"][1] = True  # environment 1 has ended, and environment 0 ends in the next step
+    environment = VectorEnv("queen", "walk", 2, 1, "SameStep", task_kwargs=settings)
+    environment.restore(arrays)
+    _, _, _, truncated, info = environment.step(np.zeros((2, 18)))
+    assert truncated.tolist() == [True, False]
+    assert info["_final_obs"].tolist() == [True, False]
+    assert environment.snapshot()["steps"].tolist() == [0, 0]
+    assert not environment.step(np.zeros((2, 18)))[3].any()

@@ -9,6 +9,7 @@ from numpy.testing import assert_array_equal
 from refusals import refused
 
 import arc_suite
+from arc_suite.envs.vector import VectorEnv
 
 # What spoils a simulation, and how MuJoCo names it.
 ACCIDENTS = {
@@ -76,6 +77,41 @@ def test_every_divergence_is_noticed_without_a_reset_between():
             environment.step(np.zeros(18))
         environment.task.before_step(np.zeros(18), environment.physics)
     environment.step(np.zeros(18))
+
+
+@pytest.mark.parametrize("task", ["walk", "rough"])
+def test_step_that_diverges_leaves_metrics_and_curriculum_alone(task):
+    settings = {"random": 0, "curriculum": True} if task == "rough" else {"random": 0}
+    single = arc_suite.load("queen", task, settings | {"on_divergence": "truncate"})
+    batch = VectorEnv("queen", task, 2, 1, "Disabled", task_kwargs=settings)
+    single.reset(), batch.reset()
+    actions = random_actions((18,), 60)
+    for action in actions:
+        single.step(action), batch.step(np.stack([action, action]))
+    metrics, outcome = single.task.progress, single.task.definition.stream_state(single.task.memory)
+    spoil(single.physics.data.ptr, "speed"), spoil(batch.batch.data, "speed", (0,))
+    assert single.step(actions[0]).last()
+    *_, info = batch.step(np.stack([actions[0]] * 2))
+    assert info["diverged"].tolist() == [True, False]
+    assert single.task.progress == metrics
+    assert {name: info[f"progress_{name}"][0] for name in metrics} == metrics
+    assert {name: values[0] for name, values in batch.task.progress.items()} == metrics
+    assert single.task.definition.stream_state(single.task.memory) == outcome
+    first, others = single.reset(), batch.reset(options={"reset_mask": np.array([True, False])})[0]
+    blocks = [np.ravel(block) for block in first.observation.values()]
+    assert_array_equal(np.concatenate(blocks).astype(np.float32), others[0])
+
+
+def test_divergence_that_raises_leaves_metrics_alone():
+    environment = load()
+    environment.reset()
+    for action in random_actions((18,), 60):
+        environment.step(action)
+    metrics = environment.task.progress
+    spoil(environment.physics.data.ptr, "speed")
+    with pytest.raises(PhysicsError):
+        environment.step(np.zeros(18))
+    assert environment.task.progress == metrics
 
 
 def test_unknown_answer_to_divergence():
