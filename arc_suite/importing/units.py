@@ -21,6 +21,14 @@ _MIN_DENSITY = 0.05
 _MAX_DENSITY = 1e5
 _MAX_GRAVITY_DIFFERENCE = 0.05  # of the suite's gravity; a file with another gravity has units of its own
 
+# Powers of a length in the numbers of qpos, by kind of joint.
+_LENGTH_POWERS = {
+    mujoco.mjtJoint.mjJNT_FREE: (1, 1, 1, 0, 0, 0, 0),
+    mujoco.mjtJoint.mjJNT_BALL: (0, 0, 0, 0),
+    mujoco.mjtJoint.mjJNT_SLIDE: (1,),
+    mujoco.mjtJoint.mjJNT_HINGE: (0,),
+}
+
 # Radius of a mesh in spans of the joints; 0.8 at most for robots of others.
 _MAX_MESH_RADIUS = 20.0
 _COMMON_MESH_RADIUS = 0.3
@@ -39,16 +47,36 @@ def scale_lengths(spec: mujoco.MjSpec, scale: float) -> None:
         geom.margin *= scale
         geom.gap *= scale
     for mesh in spec.meshes:
-        mesh.scale *= scale
-        mesh.refpos *= scale
+        mesh.scale *= scale  # which acts after refpos
     for joint in spec.joints:
         if joint.type == mujoco.mjtJoint.mjJNT_SLIDE:
             joint.range *= scale
             joint.ref *= scale
             joint.springref *= scale
+            joint.margin *= scale
+    _scale_equalities(spec, scale)
+    _scale_keyframes(spec, scale)
+
+
+def _scale_equalities(spec: mujoco.MjSpec, scale: float) -> None:
+    """Multiply the lengths of anchors and of polynomials between joints."""
+    slides = {joint.name for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_SLIDE}
     for equality in spec.equalities:
         if equality.type in (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD):
             equality.data[:6] *= scale  # anchors
+        elif equality.type == mujoco.mjtEq.mjEQ_JOINT:
+            follower_factor = scale if equality.name1 in slides else 1.0
+            leader_factor = scale if equality.name2 in slides else 1.0
+            equality.data[:5] *= follower_factor / leader_factor ** np.arange(5)
+
+
+def _scale_keyframes(spec: mujoco.MjSpec, scale: float) -> None:
+    """Multiply the places of free joints and slides in keyframes."""
+    powers = [power for joint in spec.joints for power in _LENGTH_POWERS[joint.type]]
+    factors = scale ** np.array(powers, float)
+    for key in spec.keys:
+        if len(key.qpos) == len(factors):  # the compiler refuses others, except those without numbers
+            key.qpos = factors * np.array(key.qpos)
 
 
 def scale_inertias(spec: mujoco.MjSpec, model: mujoco.MjModel, torso: int, scale: float) -> mujoco.MjModel:

@@ -5,6 +5,7 @@ import pathlib
 import re
 import struct
 
+import mujoco
 import numpy as np
 import programs
 import pytest
@@ -109,6 +110,62 @@ def test_the_scale_is_a_flag_with_bounds(tmp_path):
     assert "torso 0.269 m above the floor" in programs.passed(programs.arc_suite("import", path, "--scale=.01"))
     with pytest.raises(SpecError, match=r"a1_like\.urdf: scale: expected a number from 1e-06 to 1e\+06, got 0$"):
         import_robot(path, scale=0.0)
+
+
+WEDGE = (
+    '<asset><mesh name="wedge" refpos="0.2 0 0" scale="1 1 0.5"'
+    ' vertex="0.2 0 0 0.3 0 0 0.2 0.1 0 0.2 0 0.1" face="0 2 1 0 1 3 1 2 3 2 0 3"/>'
+)
+WEDGES = (
+    '<geom class="looks" type="mesh" mesh="wedge" pos="0.1 0 0"/>'
+    '<geom type="mesh" mesh="wedge" mass="0" pos="0.1 0 0"/><site name="imu"'
+)
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0, 0.5])
+def test_a_mesh_with_a_reference_point_grows_about_the_torso(scale, tmp_path):
+    path = tmp_path / "wedge.xml"
+    path.write_text(GO2.read_text().replace("<asset>", WEDGE).replace('<site name="imu"', WEDGES))
+    model = mujoco.MjModel.from_xml_string(import_robot(path, scale=scale).body.source)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    meshes = [geom for geom in range(model.ngeom) if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH]
+    assert len(meshes) == 2
+    for geom in meshes:
+        first = model.mesh_vertadr[model.geom_dataid[geom]]
+        points = model.mesh_vert[first : first + model.mesh_vertnum[model.geom_dataid[geom]]]
+        places = points @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom] - data.xpos[1]
+        assert places.min(axis=0) == pytest.approx(scale * np.array((0.1, 0.0, 0.0)), abs=1e-6)
+        assert places.max(axis=0) == pytest.approx(scale * np.array((0.2, 0.1, 0.05)), abs=1e-6)
+
+
+MAST = (
+    '<body name="mast" pos="0 0 0.06"><joint name="mast" type="slide" axis="0 0 1" range="0 0.2" margin="0.01"/>'
+    '<geom type="box" size="0.02 0.02 0.05" mass="0.2"/><body name="dish"><joint name="dish" axis="0 0 1"/>'
+    '<geom type="box" size="0.02 0.02 0.02" mass="0.1"/></body></body><site name="imu"'
+)
+DISH = '<equality><joint joint1="{}" joint2="{}" polycoef="{}"/></equality></mujoco>'
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0, 0.5])
+@pytest.mark.parametrize(
+    ("follower", "leader", "powers"), [("dish", "mast", (0, -1, -2, -3, -4)), ("mast", "dish", (1, 1, 1, 1, 1))]
+)
+def test_a_slide_grows_in_keyframes_and_in_constraints(follower, leader, powers, scale, tmp_path):
+    text = GO2.read_text().replace('<site name="imu"', MAST)
+    text = re.sub(r'qpos="(\S+ \S+ \S+ 1 0 0 0) ', r'qpos="\1 0.1 0.3 ', text)
+    motor = f'<position joint="{leader}" kp="1000"/></actuator>'
+    coefficients = np.array((0.01, 0.5, 0.1, 0.2, 0.3))
+    constraint = DISH.format(follower, leader, " ".join(map(str, coefficients)))
+    path = tmp_path / "mast.xml"
+    path.write_text(text.replace("</actuator>", motor).replace("</mujoco>", constraint))
+    model = mujoco.MjModel.from_xml_string(import_robot(path, scale=scale, home="home").body.source)
+    mast, dish = model.joint("mast"), model.joint("dish")
+    assert mast.range == pytest.approx((0.0, 0.2 * scale)) and mast.margin == pytest.approx(0.01 * scale)
+    assert model.eq_data[0][:5] == pytest.approx(coefficients * scale ** np.array(powers, float))
+    home = model.key_qpos[0]
+    assert home[dish.qposadr] == pytest.approx(0.3 if leader == "dish" else 0.06123)
+    assert home[mast.qposadr] == pytest.approx(0.1 * scale if leader == "mast" else 0.17683 * scale)
 
 
 @pytest.mark.slow
