@@ -1,6 +1,7 @@
 """Tasks as dm_env environments: dm_control's `Environment` for any task of the suite's contract."""
 
 import collections
+import copy
 import functools
 import os
 from collections.abc import Mapping
@@ -204,6 +205,7 @@ class Environment(KnownAttributes, control.Environment):
 
         Raises:
             RuntimeError: before the first reset.
+            ValueError: `task.random` is no generator of the kind of `RandomState(seed)`.
         """
         self.physics.check_process()
         if self.task.memory is None:
@@ -220,17 +222,30 @@ class Environment(KnownAttributes, control.Environment):
         """
         self.physics.check_process()
         run = self.task  # dm_control calls a `TaskRun` the task
-        if run.memory is None:
-            super().reset()
+        begun = self._begun()
         check_simulations = functools.partial(self.physics.check_snapshot, fields=run.definition.reads)
         state, (present_tasks, next_tasks) = snapshots.from_arrays(
-            self._state(), run.definition, check_simulations, arrays, [run.opened], self.task_kwargs
+            begun._state(), begun.task.definition, check_simulations, arrays, [run.opened], self.task_kwargs
         )
         usage.check_seeds(state.environment_arrays["stream_seeds"].tolist())
         self.physics.restore(state.simulations)
-        run.restore(state, present_tasks[0], next_tasks[0])
+        run.restore(state, present_tasks[0], next_tasks[0], like=begun.task.memory)
+        run.add_to_pictures(self.physics)
         self._step_count = int(state.environment_arrays["steps"][0])
         self._reset_next_step = bool(state.environment_arrays["ended"][0])
+
+    def _begun(self) -> Self:
+        """Return this environment if an episode has begun; else a copy in which one has, as a snapshot has."""
+        if self.task.memory is not None:
+            return self
+        begun_copy = copy.deepcopy(self)
+        control.Environment.reset(begun_copy)
+        return begun_copy
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__(state)
+        if self.task.memory is not None:  # copies of a simulation know nothing of a task
+            self.task.add_to_pictures(self.physics)
 
     def _state(self) -> snapshots.State:
         """Return the state, with a leading axis as that of a `VectorEnv` of one environment."""
@@ -475,10 +490,14 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         if start.mocap_pos is not None:
             data.mocap_pos[:] = start.mocap_pos
         physics.shown_reward = None
-        physics.marker = self.markers
-        physics.failed_legs = self.failed_legs
+        self.add_to_pictures(physics)
         self._now.memory = start.memory
         self._is_starting = True
+
+    def add_to_pictures(self, physics: Physics) -> None:
+        """Let pictures of a simulation show the markers and the failed legs of the task."""
+        physics.marker = self.markers
+        physics.failed_legs = self.failed_legs
 
     def before_step(self, action, physics):
         """Apply the action, clipped to [-1, 1].
@@ -581,7 +600,11 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
             physics: the simulation.
             steps: steps of the present episode.
             ended: whether the episode has ended.
+
+        Raises:
+            ValueError: the random numbers are of a generator that snapshots do not hold.
         """
+        snapshots.check_generator(self._random)
         self._consume_commands()
         task = self.definition
         observation = task.vector(task.observe(self._now.memory, task.read(physics.data.ptr)), np.float32)
@@ -602,12 +625,20 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
             settings=([self._present_changes], [self.next_changes]),
         )
 
-    def restore(self, state: snapshots.State, task: Task, next_task: Task) -> None:
-        """Continue from a state, given the task of its episode and that of the next."""
+    def restore(self, state: snapshots.State, task: Task, next_task: Task, like: Any) -> None:
+        """Continue from a state.
+
+        Args:
+            state: as in a snapshot.
+            task: the task of its episode.
+            next_task: the task of the next episode.
+            like: a memory of the task; numbers of the state's memory get the types of its numbers.
+        """
         self._now.memory = trees.map_leaves(
-            lambda array, present_leaf: snapshots.to_number_like(array[0], present_leaf), state.memory, self._now.memory
+            lambda array, like_leaf: snapshots.to_number_like(array[0], like_leaf), state.memory, like
         )
         self._now.readings = None
+        self._now.terms = {}
         self._is_starting = False
         self.definition = task
         self._next_task = next_task

@@ -12,7 +12,7 @@ import numpy as np
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from numpy.typing import ArrayLike
 
-from arc_suite import checks, usage, versions
+from arc_suite import checks, versions
 from arc_suite.envs.calls import KnownAttributes, one_thread_at_a_time
 from arc_suite.envs.dm import Environment, TaskRun, load
 from arc_suite.envs.prepare import checked_limit, refuse_arguments
@@ -82,8 +82,6 @@ class Env(KnownAttributes, _Adapter):
         def observation_spec(self) -> Mapping[str, specs.Array]: ...
         def control_timestep(self) -> float: ...
 
-    _np_random_seed = usage.UNKNOWN_SEED  # until a seed is given
-
     _FORMER_NAMES = {  # in pickles of earlier versions
         **KnownAttributes._FORMER_NAMES,
         "_tells": "_has_privileged_info",
@@ -144,9 +142,6 @@ class Env(KnownAttributes, _Adapter):
         self._window: Window | None = None
         self._episode_is_running = False
         self._closed = False
-        random = (task_kwargs or {}).get("random")
-        if random is not None and not isinstance(random, np.random.RandomState):
-            self._np_random_seed = checks.seed(random)
         self._sealed_by = __name__
 
     def set_wrapper_attr(self, name: str, value: Any, **options) -> bool:
@@ -182,7 +177,11 @@ class Env(KnownAttributes, _Adapter):
     @np_random.setter
     def np_random(self, value: np.random.Generator):
         self._env.task.random = np.random.RandomState(value.bit_generator)
-        self._np_random_seed = usage.UNKNOWN_SEED
+
+    @property
+    def np_random_seed(self) -> int:
+        """The seed of the stream of random numbers; -1 if it is unknown."""
+        return self._env.task.stream_seed
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -208,8 +207,6 @@ class Env(KnownAttributes, _Adapter):
             raise ValueError(f"unknown option of reset {name}: one environment has none; vector ones have reset_mask")
         observation = self._env.reset(seed).observation
         gymnasium.Env.reset(self, seed=None if seed is None else checks.seed(seed))
-        if self._np_random_seed == usage.UNKNOWN_SEED:  # a run that learns may have begun a stream
-            self._np_random_seed = self._env.task.stream_seed
         self._episode_is_running = True
         self._show()
         return _to_vector(observation), self._privileged_info()
@@ -273,7 +270,7 @@ class Env(KnownAttributes, _Adapter):
         self._check_open("take a snapshot")
         if self._env.task.memory is None:
             raise ResetNeeded("cannot take a snapshot: no episode has begun; call reset first")
-        return self._env.snapshot() | {"stream_seeds": np.array([self._np_random_seed])}
+        return self._env.snapshot()
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Continue, bit-exactly, from the snapshot of an environment of the same task.
@@ -284,7 +281,6 @@ class Env(KnownAttributes, _Adapter):
         """
         self._check_open("restore")
         self._env.restore(arrays)
-        self._np_random_seed = int(arrays["stream_seeds"][0])
         self._episode_is_running = not arrays["ended"][0]
 
     def render(self) -> np.ndarray | None:

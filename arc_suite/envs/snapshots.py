@@ -34,6 +34,7 @@ class _RandomArray(NamedTuple):
     largest: int
 
 
+_GENERATOR = "MT19937"  # of `RandomState(seed)`
 _KEY_COUNT = 624  # numbers in the key of the Mersenne Twister
 # By name, in the order of the parts of `RandomState.get_state()` after the generator's name: keys, pos, has_gauss and
 # cached_gaussian. The generator draws normal numbers in pairs, of which the last two parts store the second.
@@ -69,6 +70,16 @@ class State(NamedTuple):
     randoms: list[Any]
     environment_arrays: Mapping[str, np.ndarray]
     settings: tuple[list[str], list[str]]
+
+
+def check_generator(random: np.random.RandomState) -> None:
+    """Raise ValueError for a generator whose state no snapshot holds, such as PCG64 of `default_rng`."""
+    generator = random.get_state(legacy=False)["bit_generator"]
+    if generator != _GENERATOR:
+        raise ValueError(
+            f"random: snapshots hold states of {_GENERATOR} alone, got {generator}; "
+            "reset(seed=...) or np.random.RandomState(seed) begins such a stream"
+        )
 
 
 def to_arrays(state: State, opened_tasks: Sequence[Task]) -> dict[str, np.ndarray]:
@@ -248,7 +259,7 @@ def _read_randoms(arrays: Mapping[str, np.ndarray], num_envs: int) -> list[tuple
             raise ValueError(f"{name}: expected numbers from {smallest} to {largest}")
     keys, positions, halves, normals = (arrays[name] for name in _RANDOM_ARRAYS)
     parts = zip(keys, positions.tolist(), halves.tolist(), normals.tolist(), strict=True)
-    return [("MT19937", *parts_of_state) for parts_of_state in parts]
+    return [(_GENERATOR, *parts_of_state) for parts_of_state in parts]
 
 
 def _read_stream(like, leaves_by_index: Mapping[str, np.ndarray]) -> Any:

@@ -1,9 +1,10 @@
 """Many environments of one task as one Gymnasium vector environment, on `mujoco.batch`."""
 
+import copy
 import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, Self
 
 import gymnasium
 import mujoco
@@ -537,20 +538,25 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
     def _checked_snapshot(self, arrays: Mapping[str, np.ndarray]) -> tuple[snapshots.State, list[list[Task]]]:
         """Return the state of a snapshot, and the tasks of its episodes and of the next ones.
 
-        If no episode has begun yet, episodes begin, so that there is a state to compare with.
-
         Raises:
             ValueError: an array that does not fit, or a seed that the run that learns may not play.
         """
-        if self._memory is None:
-            self._start_episodes(np.ones(self.num_envs, bool), self._observation)
         self._consume_commands()
         _, _, task_kwargs = self.arguments
+        begun = self._begun()
         state, tasks = snapshots.from_arrays(
-            self._state(), self._task, self.batch.check_snapshot, arrays, self._opened_tasks, task_kwargs
+            begun._state(), begun._task, self.batch.check_snapshot, arrays, self._opened_tasks, task_kwargs
         )
         usage.check_seeds(state.environment_arrays["stream_seeds"].tolist())
         return state, tasks
+
+    def _begun(self) -> Self:
+        """Return these environments if episodes have begun; else a copy in which they have, as a snapshot has."""
+        if self._memory is not None:
+            return self
+        begun_copy = copy.deepcopy(self)
+        begun_copy._start_episodes(np.ones(self.num_envs, bool), begun_copy._observation)
+        return begun_copy
 
     def _restore_state(self, state: snapshots.State, tasks: list[list[Task]]) -> None:
         """Continue from a state, given the tasks of its episodes and of the next ones."""
@@ -558,6 +564,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         self._tasks, self._next_tasks = tasks
         self._task = _join_tasks(self._tasks)
         self._memory = state.memory
+        self._terms = {}
         self._streams = state.streams
         present_changes, next_changes = state.settings
         self._changes = np.array(present_changes, object)

@@ -288,6 +288,7 @@ class Physics(dm_mujoco.Physics):
         mujoco.mj_copyData(physics.data.ptr, physics.model.ptr, self.data.ptr)
         physics.body = self.body
         physics.arena = self.arena
+        physics.shown_reward = self.shown_reward
         if share_model:
             self._shared = True
             physics._shared = True
@@ -333,16 +334,19 @@ class Physics(dm_mujoco.Physics):
             if name != "state" and not name.startswith((MODEL_PREFIX, LASTING_PREFIX)):
                 getattr(data, name)[:] = array[0]
         self.divergence = None
+        self.shown_reward = None
 
     def __getstate__(self):
         self._keep_edits(self._written)
-        return super().__getstate__(), self.body, self.arena, list(self._written), self._lasting
+        written_names = list(self._written)
+        return super().__getstate__(), self.body, self.arena, written_names, self._lasting, self.shown_reward
 
     def __setstate__(self, state):
-        data, self.body, self.arena, written_names, lasting = state
+        data, self.body, self.arena, written_names, lasting, *shown_rewards = state
         # dm_control recomputes the derived quantities; here they are one substep behind the state.
         saved_data = copy.copy(data.ptr)
         super().__setstate__(data)
         mujoco.mj_copyData(data.ptr, data.model.ptr, saved_data)
         self._lasting = lasting
         self._remember_values(written_names)
+        self.shown_reward = shown_rewards[0] if shown_rewards else None  # pickles of earlier versions have none

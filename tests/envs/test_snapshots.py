@@ -13,6 +13,7 @@ from tiers import tiers, turn
 import arc_suite
 from arc_suite import registry
 from arc_suite.bodies.environments import BodiesEnv
+from arc_suite.envs.gym import Env
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.tasks import TASKS
 
@@ -238,3 +239,72 @@ def test_a_snapshot_imports_no_module_that_its_settings_name():
     line = "snapshot: of another setup or number of environments: modifier 'strolling:wind': files import nothing;"
     with refused(line, begins=True):
         environments.restore(hostile)
+
+
+@pytest.mark.parametrize("kind", ["single", "gym", "vector"])
+def test_a_refused_first_restore_changes_nothing(kind):
+    settings = {"random": 3}
+    make = {
+        "single": lambda: arc_suite.load("queen", "walk", settings, {"flat_observation": True}),
+        "gym": lambda: Env("queen", "walk", settings),
+        "vector": lambda: VectorEnv("queen", "walk", 2, 1, task_kwargs=settings),
+    }[kind]
+    environment, twin = make(), make()
+    with refused("snapshot: of another setup or number of environments:", begins=True):
+        environment.restore({})
+    with pytest.raises((RuntimeError, ResetNeeded), match="no episode has begun"):
+        environment.snapshot()
+    first, expected = environment.reset(), twin.reset()
+    if kind == "single":
+        first, expected = [[step.observation["observations"]] for step in (first, expected)]
+    np.testing.assert_array_equal(first[0], expected[0])
+    twin.restore(environment.snapshot())
+    fresh = make()
+    fresh.restore(environment.snapshot())
+    actions = np.full((2, 18) if kind == "vector" else 18, 0.3)
+    for _ in range(3):
+        steps = [copied.step(actions) for copied in (environment, twin, fresh)]
+        rewards = [step.reward if kind == "single" else step[1] for step in steps]
+        np.testing.assert_array_equal(rewards[0], rewards[1])
+        np.testing.assert_array_equal(rewards[0], rewards[2])
+
+
+@pytest.mark.parametrize("way", ["np_random", "random"])
+def test_generators_that_snapshots_do_not_hold_are_refused_by_them(way):
+    environment = Env("queen", "walk", {"random": np.random.RandomState(np.random.PCG64(0))} if way == "random" else {})
+    if way == "np_random":
+        environment.np_random = np.random.default_rng(0)
+    environment.reset()
+    message = "random: snapshots hold states of MT19937 alone, got PCG64;"
+    with refused(message, begins=True):
+        environment.snapshot()
+    with refused(message, begins=True):
+        environment.restore({})
+    environment.reset(seed=4)
+    assert environment.snapshot()["stream_seeds"] == 4
+
+
+def test_a_generator_of_ones_own_has_no_seed_anywhere():
+    environment = Env("queen", "walk")
+    environment.reset(seed=3)
+    assert environment.np_random_seed == environment.snapshot()["stream_seeds"] == 3
+    environment.unwrapped._env.task.random = np.random.RandomState(1)
+    assert environment.np_random_seed == environment.snapshot()["stream_seeds"] == -1
+
+
+def test_restore_forgets_the_terms_and_the_glow_of_the_abandoned_future():
+    environment = arc_suite.load("queen", "walk", {"random": 0}, visualize_reward=True)
+    environment.reset()
+    arrays = environment.snapshot()
+    picture = environment.physics.render(60, 80)
+    for _ in range(5):
+        environment.step(np.full(18, 0.3))
+    environment.restore(arrays)
+    assert environment.task.terms == {} and environment.physics.shown_reward is None
+    np.testing.assert_array_equal(environment.physics.render(60, 80), picture)
+    batch = VectorEnv("queen", "walk", 2, 1)
+    batch.reset()
+    arrays = batch.snapshot()
+    batch.step(np.zeros((2, 18)))
+    batch.restore(arrays)
+    assert batch.task.terms == {}

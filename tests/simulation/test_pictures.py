@@ -1,5 +1,8 @@
 """Pictures of states: drawn without a simulation, and the same as of one."""
 
+import copy
+import pickle
+
 import imports
 import mujoco
 import numpy as np
@@ -8,6 +11,7 @@ from fixtures.obstacles import Obstacle
 from numpy.testing import assert_array_equal
 from tiers import never, tiers
 
+import arc_suite
 from arc_suite.arenas import ARENAS, FLAT
 from arc_suite.bodies import generator
 from arc_suite.markers import Marker
@@ -188,3 +192,25 @@ def test_qualities_show_the_same_in_finer_pixels():
     assert_array_equal(*depths)
     with pytest.raises(ValueError, match="^unknown quality 'fine'"):
         physics.render(90, 120, quality="fine")
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda environment: pickle.loads(pickle.dumps(environment))])
+def test_copies_of_environments_look_like_them(copied):
+    environment = arc_suite.load("queen", "limp", {"random": 0}, visualize_reward=True)
+    environment.reset()
+    for _ in range(45):
+        environment.step(np.zeros(18))
+    twin = copied(environment)
+    assert twin.physics.failed_legs() == environment.physics.failed_legs() != ()
+    assert twin.physics.shown_reward == environment.physics.shown_reward > 0.0
+    np.testing.assert_array_equal(twin.physics.render(120, 160), environment.physics.render(120, 160))
+
+
+def test_a_restored_environment_shows_arrows_and_failed_legs_before_its_first_step():
+    environment = arc_suite.load("queen", "limp", {"random": 0})
+    environment.reset()
+    for _ in range(45):
+        environment.step(np.zeros(18))
+    other = arc_suite.load("queen", "limp")
+    other.restore(environment.snapshot())
+    np.testing.assert_array_equal(other.physics.render(120, 160), environment.physics.render(120, 160))
