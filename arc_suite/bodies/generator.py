@@ -14,6 +14,7 @@ import numpy as np
 from arc_suite import checks
 from arc_suite.bodies import imported_variants
 from arc_suite.models import imported_sizes
+from arc_suite.robots import mirror
 from arc_suite.robots.spec import MAX_NAME, Ballast, Body, Foot, Joint, Leg, Link, Solid, Torso, Vector
 
 LEG_RANGE = (4, 12)  # fewest and most
@@ -230,7 +231,11 @@ def _scale_solid(solid: Solid, factor: float) -> Solid:
 def _scale_leg(leg: Leg, factor: float) -> Leg:
     links = []
     for link in leg.links:
-        links.append(link.replace(end=_scale_lengths(link.end, factor), radius=factor * link.radius))
+        scaled_link = link.replace(end=_scale_lengths(link.end, factor), radius=factor * link.radius)
+        if link.joint:  # torques scale with weights times lengths
+            friction_loss = factor**4 * link.joint.friction_loss
+            scaled_link = scaled_link.replace(joint=link.joint.replace(friction_loss=friction_loss))
+        links.append(scaled_link)
     foot = leg.foot.replace(radius=factor * leg.foot.radius)
     return leg.replace(mount=_scale_lengths(leg.mount, factor), links=tuple(links), foot=foot)
 
@@ -264,15 +269,16 @@ def mutated(body: Body, seed: int, amount: float = 0.1) -> Body:
 def list_deformations(body: Body) -> tuple[str, ...]:
     """Return the names of the numbers that `deform_legs` takes: l1_upper of a length, l1_heading of a heading, ...
 
-    The name of a leg stands for its mirror images, too. Of imported bodies only links with a length of their own
-    change.
+    The name of a leg stands for its mirror images, too. A leg on the midline has no heading: it would have no image. Of
+    imported bodies only links with a length of their own change.
     """
     if body.source:
         return imported_variants.list_changes(body)
     names = []
     for leg, _ in _legs_with_images(body):
         names += [leg.full_name(link) for link in leg.links]
-        names.append(f"{leg.name}_heading")
+        if not mirror.are_images(body, leg, leg):
+            names.append(f"{leg.name}_heading")
     return tuple(names)
 
 
@@ -300,29 +306,35 @@ def deform_legs(body: Body, changes: np.ndarray) -> Body:
         return variant.replace(name=_changed_name(body, "mutated"))
     deformed_legs = {}
     first = 0  # index of the leg's changes
-    for leg, image_names in _legs_with_images(body):
+    for leg, images in _legs_with_images(body):
         turn_index = first + len(leg.links)
-        deformed_leg = _deform_leg(leg, changes[first:turn_index, None], float(changes[turn_index]))
-        deformed_legs[leg.name] = deformed_leg
-        for name in image_names:
-            deformed_legs[name] = deformed_leg.mirrored(name)
+        logarithms = changes[first:turn_index, None]
+        if mirror.are_images(body, leg, leg):
+            deformed_legs[leg.name] = _deform_leg(leg, logarithms, turn=0.0)
+            first = turn_index
+            continue
+        turn = float(changes[turn_index])
+        deformed_legs[leg.name] = _deform_leg(leg, logarithms, turn)
+        for image in images:
+            deformed_legs[image.name] = _deform_leg(image, logarithms, -turn)
         first = turn_index + 1
     return _change_body(body, "mutated", legs=[deformed_legs[leg.name] for leg in body.legs])
 
 
-def _legs_with_images(body: Body) -> Iterator[tuple[Leg, list[str]]]:
-    """Yield legs, each with the names of its mirror images among later legs. Images are not yielded themselves."""
+def _legs_with_images(body: Body) -> Iterator[tuple[Leg, list[Leg]]]:
+    """Yield legs, each with its mirror images among later legs. Images are not yielded themselves."""
     known_names = set()
     for leg in body.legs:
         if leg.name in known_names:
             continue
         known_names.add(leg.name)
-        image_names = []
-        for candidate in body.legs:
-            if candidate.name not in known_names and leg.mirrored(candidate.name) == candidate:
-                image_names.append(candidate.name)
-        known_names.update(image_names)
-        yield leg, image_names
+        images = [
+            candidate
+            for candidate in body.legs
+            if candidate.name not in known_names and mirror.are_images(body, leg, candidate)
+        ]
+        known_names.update(image.name for image in images)
+        yield leg, images
 
 
 def _deform_leg(leg: Leg, logarithms: np.ndarray, turn: float) -> Leg:

@@ -111,6 +111,11 @@ def _find_counterpart(leg: Leg, body: Body, tolerance: _Tolerance) -> tuple[int,
     raise ValueError(f"{body.name} is not left-right symmetric: no leg is across from {leg.name}")
 
 
+def are_images(body: Body, leg: Leg, candidate: Leg) -> bool:
+    """Return whether two legs of a body are reflections of each other; a leg on the midline is one of itself."""
+    return _match_legs(leg, candidate, _Tolerance(body)) is not None
+
+
 def _match_legs(leg: Leg, candidate: Leg, tolerance: _Tolerance) -> list[int] | None:
     """Return the signs of the joints of two legs that are reflections of each other, else None."""
     if len(leg.links) != len(candidate.links):
@@ -155,11 +160,10 @@ def _joint_axis(leg: Leg, link: Link) -> np.ndarray:
 
 
 def _drive_numbers(joint: Joint) -> list[float | None]:
-    """Return the numbers of a joint's drive: armature, damping, torque, its line and delay, and two of a servo."""
-    numbers = [joint.armature, joint.damping, joint.torque]
-    numbers += [getattr(joint.drive, name, None) for name in ("no_load_speed", "stall", "delay")]
-    if joint.servo:
-        numbers += [joint.servo.stiffness, joint.servo.damping]
+    """Return the numbers of a joint's drive: resistances, torque, its line, loss and delay, and two of a servo."""
+    numbers = [joint.armature, joint.damping, joint.friction_loss, joint.torque]
+    numbers += [getattr(joint.drive, name, None) for name in ("no_load_speed", "stall", "winding_loss", "delay")]
+    numbers += [getattr(joint.servo, name, None) for name in ("stiffness", "damping")]
     return numbers
 
 

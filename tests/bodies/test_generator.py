@@ -7,12 +7,13 @@ import mujoco
 import numpy as np
 import pytest
 from dm_control import mjcf
+from numpy.testing import assert_array_equal
 from refusals import refused
 
 from arc_suite import models
 from arc_suite.bodies import generator, shaping
 from arc_suite.models.standing import measure_standing
-from arc_suite.robots import ROBOTS
+from arc_suite.robots import ROBOTS, mirror
 from arc_suite.robots.spec import SpecError
 from arc_suite.tasks.fitting import fitted_parameters
 from arc_suite.tasks.walk import Walk
@@ -211,3 +212,26 @@ def test_deformations_are_named_by_what_they_change(body):
 def test_other_numbers_of_deformations_are_refused():
     with refused("changes: expected 12 numbers, of l1_upper, l1_middle, l1_lower, l1_heading, ", begins=True):
         generator.deform_legs(generator.generate(6, 3), [0.1, 0.2])
+
+
+@pytest.mark.parametrize("legs", [5, 6, 7, 8])
+def test_legs_around_a_torso_stay_mirrored(legs):
+    """A leg on the midline stays there, the others have one number for both sides."""
+    body = generator.generate(legs, 3, "radial")
+    child = generator.mutated(generator.mutated(body, 3), 4)
+    assert_array_equal(mirror.image(child).legs, mirror.image(body).legs)
+    assert child.legs[0].links != body.legs[0].links
+    assert len(generator.list_deformations(body)) == 4 * ((legs + 1) // 2) - legs % 2
+
+
+def test_dry_friction_grows_with_torques():
+    """The share of the sized motors that friction takes is the same at every scale; shapes scale alike."""
+    body = generator.generate(4, 2)
+    legs = []
+    for leg in body.legs:
+        links = [link.replace(joint=link.joint.replace(friction_loss=0.05)) for link in leg.links]
+        legs.append(leg.replace(links=tuple(links)))
+    rubbing_body = body.replace(name="rubbing", legs=tuple(legs))
+    for scaled_body in (generator.scaled(rubbing_body, 0.25), shaping.shaped(rubbing_body, scale=0.25)):
+        assert {joint.friction_loss for joint in scaled_body.joints} == {0.05 / 256.0}
+    assert generator.scaled(rubbing_body, 1.0).legs == rubbing_body.legs

@@ -112,6 +112,8 @@ def relinked(**fields):
         relinked(armature=1.5),
         relinked(damping=None),
         relinked(motor=None),
+        relinked(friction_loss=0.1),
+        relinked(motor=QUEEN.legs[0].joints[0].motor.replace(winding_loss=0.1)),
         relinked(range_deg=(-40.0, 30.0)),
         relinked(axis=(0.0, 0.1, 1.0)),
         changed(links=(*QUEEN.legs[0].links[:2], Link(name="lower", end=(0.02, 0.02, -0.25), radius=0.04))),
