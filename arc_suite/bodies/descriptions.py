@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite.bodies.padding import MAX_JOINTS, MAX_LEGS, pad_joints
+from arc_suite.models.outline import level_extents
 from arc_suite.models.sizing import position_gains, size_body
 from arc_suite.models.standing import GRAVITY, PoseMechanics, measure_standing
 from arc_suite.robots.spec import Body
@@ -27,8 +28,8 @@ class Description(NamedTuple):
             one of four (4), Jacobian of the sole (3 x 4), joint ranges, rad (4 x 2), stiffness, action per rad, and
             damping of position control (4 + 4), duty factor. Gains are those at an `agility` of 1, as position control
             exerts the same torques with stronger motors.
-        torso: (..., 10) number of legs by 12, half-extents of the first solid (3), center of mass (3), static
-            stability margin, R, duty factor.
+        torso: (..., 10) number of legs by 12, half-extents of the first solid along the torso's axes (3), center of
+            mass (3), static stability margin, R, duty factor.
         mask: (..., 12, 4) whether a leg has a joint.
         reach: (..., 12, 4) angles that an action of 1 asks for, rad.
     """
@@ -56,10 +57,7 @@ def body_description(task: Task) -> Description:
 
     legs = np.zeros((MAX_LEGS, LEG_DESCRIPTION_SIZE))
     legs[:leg_count] = _describe_legs(body, pose, ranges, duty_factor)
-    first_solid = body.torso.solids[0]
-    missing_extents = 3 - len(first_solid.size)  # of solids that are round about an axis
-    half_extents = np.array((*first_solid.size, *(first_solid.size[-1],) * missing_extents))
-    lengths = np.array((*half_extents, *pose.center, pose.margin, reach(body))) / height
+    lengths = np.array((*level_extents(body.torso.solids[0]), *pose.center, pose.margin, reach(body))) / height
     return Description(
         legs=legs.astype(np.float32),
         torso=np.array((leg_count / MAX_LEGS, *lengths, duty_factor), np.float32),

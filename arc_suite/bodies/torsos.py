@@ -3,7 +3,7 @@
 import math
 
 from arc_suite import checks
-from arc_suite.robots.spec import Body, Solid
+from arc_suite.robots.spec import Body, Solid, Vector
 
 UNCHANGED = "own"  # leaves a part as the body has it
 
@@ -64,16 +64,14 @@ def _capsule(chassis: Solid) -> Solid:
 
 def _round_head(chassis: Solid) -> Solid:
     half_length, _, half_thickness = chassis.size
-    radius = 0.8 * half_thickness
-    return Solid(
-        name="head", shape="sphere", size=(radius,), position=(half_length, 0.0, _HEAD_HEIGHT * half_thickness)
-    )
+    position = _place_on(chassis, half_length, _HEAD_HEIGHT * half_thickness)
+    return Solid(name="head", shape="sphere", size=(0.8 * half_thickness,), position=position)
 
 
 def _long_head(chassis: Solid) -> Solid:
     half_length, _, half_thickness = chassis.size
     size = (1.8 * half_thickness, 0.7 * half_thickness, 0.6 * half_thickness)
-    position = (half_length + 0.8 * half_thickness, 0.0, _HEAD_HEIGHT * half_thickness)
+    position = _place_on(chassis, half_length + 0.8 * half_thickness, _HEAD_HEIGHT * half_thickness)
     return Solid(name="head", shape="ellipsoid", size=size, position=position)
 
 
@@ -89,9 +87,15 @@ def _tail(chassis: Solid, length: float) -> Solid:
         name="tail",
         shape="capsule",
         size=(radius, half_rod),
-        position=(x, 0.0, z),
+        position=_place_on(chassis, x, z),
         euler_deg=(0.0, _TAIL_RISE - 90.0, 0.0),
     )
+
+
+def _place_on(chassis: Solid, ahead: float, above: float) -> Vector:
+    """Return the point (3,) of the torso's frame that is ahead of the middle of its solid and above it, m."""
+    x, y, z = chassis.position
+    return x + ahead, y, z + above
 
 
 def _short_tail(chassis: Solid) -> Solid:

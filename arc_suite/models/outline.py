@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
-from arc_suite.robots.spec import Body, Leg, Solid
+from arc_suite.robots.spec import Body, Leg, Solid, Vector
 
 # Corners (8, 3) of a box with half-extents of 1.
 CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
@@ -14,11 +14,38 @@ CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in
 
 def solid_corners(solid: Solid) -> np.ndarray:
     """Return the corners of a box around a solid, turned with it, in the torso's frame: (8, 3)."""
+    return solid.position + (CORNERS * _half_extents(solid)) @ _rotation(solid).T
+
+
+def level_extents(solid: Solid) -> np.ndarray:
+    """Return the half-extents (3,) of a solid along the torso's axes, m."""
+    ellipsoid, box = _split(solid)
+    rotation = _rotation(solid)
+    return np.sqrt(rotation**2 @ np.square(ellipsoid)) + abs(rotation) @ box
+
+
+def _split(solid: Solid) -> tuple[Vector, Vector]:
+    """Return half-extents of an ellipsoid and of a box, m, whose sums of extents are those of a solid in any turn."""
+    radius = solid.size[0]
+    half_length = solid.size[-1]  # without the ends of a capsule
+    nothing = (0.0, 0.0, 0.0)
+    rod = (0.0, 0.0, half_length)
+    return {
+        "sphere": ((radius, radius, radius), nothing),
+        "capsule": ((radius, radius, radius), rod),
+        "cylinder": ((radius, radius, 0.0), rod),
+        "ellipsoid": (solid.size, nothing),
+        "box": (nothing, solid.size),
+    }[solid.shape]
+
+
+def _rotation(solid: Solid) -> np.ndarray:
+    """Return the rotation matrix (3, 3) of a solid in the torso's frame."""
     quaternion = np.empty(4)
     mujoco.mju_euler2Quat(quaternion, np.radians(solid.euler_deg), "xyz")
     rotation = np.empty(9)
     mujoco.mju_quat2Mat(rotation, quaternion)
-    return solid.position + (CORNERS * _half_extents(solid)) @ rotation.reshape(3, 3).T
+    return rotation.reshape(3, 3)
 
 
 def _half_extents(solid: Solid) -> tuple[float, ...]:
