@@ -5,6 +5,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from arc_suite import rotations
+
 # Directions of the torso's frame, by name.
 AXES = {
     "x": (1.0, 0.0, 0.0),
@@ -68,12 +70,28 @@ def turn_torso(spec: mujoco.MjSpec, model: mujoco.MjModel, torso: int, facing: F
         for child in children:
             if child.frame is None:
                 child.set_frame(turned_frame)
-    for equality in spec.equalities:
-        if equality.type == mujoco.mjtEq.mjEQ_CONNECT and equality.name1 == body.name:
-            equality.data[:3] = facing.rotation @ equality.data[:3]  # the anchor, in the torso's frame
+    _turn_equalities(spec, body.name, facing)
     if body.explicitinertial:
         body.fullinertia[0] = np.nan
         body.inertia = model.body_inertia[torso]
         body.ipos = facing.rotation @ model.body_ipos[torso]
         mujoco.mju_mulQuat(body.iquat, quaternion, model.body_iquat[torso])
     return spec.compile()
+
+
+def _turn_equalities(spec: mujoco.MjSpec, torso: str, facing: Facing) -> None:
+    """Turn what connections and welds give in the frame of the torso."""
+    for equality in spec.equalities:
+        if equality.objtype != mujoco.mjtObj.mjOBJ_BODY or torso not in (equality.name1, equality.name2):
+            continue
+        data = equality.data
+        if equality.type == mujoco.mjtEq.mjEQ_CONNECT and equality.name1 == torso:
+            data[:3] = facing.rotation @ data[:3]  # the anchor, in the frame of the first body
+        elif equality.type == mujoco.mjtEq.mjEQ_WELD:
+            # The anchor is in the frame of the second body, whose pose is in that of the first one.
+            if equality.name1 == torso:
+                data[3:6] = facing.rotation @ data[3:6]
+                data[6:10] = rotations.product(facing.quaternion, data[6:10])
+            else:
+                data[:3] = facing.rotation @ data[:3]
+                data[6:10] = rotations.product(data[6:10], rotations.inverse(facing.quaternion))

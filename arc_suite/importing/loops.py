@@ -142,5 +142,6 @@ def _equality_rows(data: mujoco.MjData, equalities: Sequence[int]) -> tuple[np.n
     """Return the errors (rows,) of constraints, and their Jacobian (rows, nv)."""
     is_equality = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
     rows = np.flatnonzero(is_equality & np.isin(data.efc_id, equalities))
-    jacobian = data.efc_J.reshape(data.nefc, -1)
+    # The buffer has room for constraints that MuJoCo drops, as no joint moves them.
+    jacobian = data.efc_J[: data.nefc * data.model.nv].reshape(data.nefc, data.model.nv)
     return data.efc_pos[rows], jacobian[rows]

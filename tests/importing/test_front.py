@@ -11,6 +11,7 @@ import pytest
 
 from arc_suite.evaluation import cures
 from arc_suite.importing import import_robot
+from arc_suite.importing.facing import Facing
 
 FOLDER = pathlib.Path(__file__).parents[1] / "fixtures" / "robots"
 GO2, A1, HEXAPOD = (FOLDER / name for name in ("go2_like.xml", "a1_like.urdf", "hexapod.urdf"))
@@ -77,6 +78,42 @@ def test_the_mass_of_a_turned_torso_stays_in_its_place(tmp_path):
         state.qvel[:] = np.linspace(-1.0, 1.0, model.nv)
         mujoco.mj_forward(model, state)
     assert data[1].qacc == pytest.approx(data[0].qacc, rel=1e-6, abs=1e-6)
+
+
+POD = (
+    '<body name="pod" pos="0.1 0 0.2"><joint name="pod" axis="0 1 0"/>'
+    '<geom type="sphere" size="0.02" mass="0.2"/></body>'
+    '<site name="imu"'
+)
+CONSTRAINTS = {
+    "weld, torso first": ('<weld body1="base" body2="pod" relpose="0.1 0 0.2 1 0 0 0"/>', (0.1, 0.0, 0.2)),
+    "weld, torso first, anchor": ('<weld body1="base" body2="pod" anchor="0 0 0.1"/>', (0.1, 0.0, 0.3)),
+    "weld, torso last": ('<weld body1="pod" body2="base" relpose="-0.1 0 -0.2 1 0 0 0"/>', (0.0, 0.0, 0.0)),
+    "weld, torso last, anchor": ('<weld body1="pod" body2="base" anchor="0.1 0 0.3"/>', (0.1, 0.0, 0.3)),
+    "connection, torso first": ('<connect body1="base" body2="pod" anchor="0.1 0 0.3"/>', (0.1, 0.0, 0.3)),
+    "connection, torso last": ('<connect body1="pod" body2="base" anchor="0 0 0.1"/>', (0.1, 0.0, 0.3)),
+}
+
+
+@pytest.mark.parametrize("forward", ["x", "y", "-y", "-x"])
+@pytest.mark.parametrize("case", CONSTRAINTS)
+def test_a_constraint_at_a_turned_torso_stays_in_its_place(case, forward, tmp_path):
+    constraint, place = CONSTRAINTS[case]
+    text = GO2.read_text().replace('<site name="imu"', POD)
+    text = re.sub(r'qpos="(\S+ \S+ \S+ 1 0 0 0) ', r'qpos="\1 0 ', text)
+    path = tmp_path / "pod.xml"
+    path.write_text(text.replace("</mujoco>", f"<equality>{constraint}</equality></mujoco>"))
+    model = mujoco.MjModel.from_xml_string(import_robot(path, forward=forward).body.source)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    assert data.joint("pod").qpos == pytest.approx(0.0, abs=1e-6)
+    expected_place = Facing(forward).rotation @ place
+    for side in (1, 2):
+        site = data.site(f"loop0_{side}").xpos - data.body("torso").xpos
+        assert site == pytest.approx(expected_place, abs=1e-6), side
+    errors = data.efc_pos[data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY]
+    assert len(errors) == (6 if "weld" in case else 3) and errors == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("source", [GO2, A1], ids=lambda path: path.stem)

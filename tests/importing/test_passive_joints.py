@@ -122,6 +122,17 @@ def test_legs_that_a_loop_moves_are_refused_by_name(tmp_path):
     assert str(error.value) == f"{path}: {LINE.format(joint='knee', parts='FL_end and FL_shank')}"
 
 
+@pytest.mark.parametrize("anchor", ["0.1 0 0.2", "0.1 0.1 0.2"])
+def test_a_constraint_that_no_joint_moves_keeps_no_robot_out(anchor, tmp_path):
+    pod = '<body name="pod" pos="0.1 0 0.2"><joint name="pod" axis="0 1 0"/><geom size="0.02" mass="0.2"/></body>'
+    constraint = f'<connect body1="trunk" body2="pod" anchor="{anchor}"/>'  # on the pod's hinge
+    source = import_robot(write(tmp_path, equality=constraint, further=pod)).body.source
+    expected_source = import_robot(write(tmp_path, further=pod)).body.source
+    model, expected_model = map(mujoco.MjModel.from_xml_string, (source, expected_source))
+    assert (model.neq, expected_model.neq) == (4, 0)
+    assert model.key_qpos[0] == pytest.approx(expected_model.key_qpos[0], abs=1e-9)
+
+
 def toes(folder, declared="", limit="", joint=""):
     """Write a URDF whose feet are sprung toes, with further elements, and return the path."""
     text = (imports.FILES / "a1_like.urdf").read_text()
