@@ -96,7 +96,7 @@ class _StandingRobot(NamedTuple):
 def import_robot(
     path: str | os.PathLike[str],
     home: str | None = None,
-    feet: Sequence[str] = (),
+    feet: str | Sequence[str] = (),
     armature: float | None = None,
     forward: str | None = None,
     scale: float = 1.0,
@@ -109,7 +109,8 @@ def import_robot(
         path: path of the file.
         home: name of the keyframe in which it stands, or angles of its joints, rad, such as "*_thigh=0.8,*_calf=-1.5":
             other joints are at zero, or at the nearest angle of their range; None to find a pose.
-        feet: names of bodies or geoms at the ends of its legs, or of links fixed to them; none to find them.
+        feet: names of bodies or geoms at the ends of its legs, or of links fixed to them; none to find them. Several
+            names on a leg, such as heel and toe, are one foot.
         armature: rotor inertia of each joint for which the file has none, kg m^2; None for none, or for a small one
             where joints buzz without it.
         forward: axis of the file's torso that points ahead, out of `facing.AXES`; None for x, or for another one where
@@ -127,7 +128,8 @@ def import_robot(
     min_scale, max_scale = units.SCALE_RANGE
     if not min_scale <= scale <= max_scale:
         raise SpecError(f"{path}: scale: expected a number from {min_scale:g} to {max_scale:g}, got {scale:g}")
-    choices = _Choices(home, tuple(feet), armature, forward, scale, stiffness, damping)
+    foot_names = (feet,) if isinstance(feet, str) else tuple(feet)
+    choices = _Choices(home, foot_names, armature, forward, scale, stiffness, damping)
     imported_robot, _ = _import_file(Path(path), choices)
     return imported_robot
 
@@ -139,11 +141,11 @@ def body_of(path: str | os.PathLike[str]) -> Body:
         SpecError: as `import_robot`.
         OSError: as `import_robot`.
     """
-    key = os.path.realpath(path)
+    key = os.fspath(Path(path).absolute())  # of a link itself, whose name and neighbors count
     cached_body = _cached_bodies.pop(key, None)
     if cached_body is None or any(_digest(part) != digest for part, digest in cached_body.digests.items()):
         imported_robot, parts = _import_file(Path(path), _Choices())
-        cached_body = _CachedBody(imported_robot.body, {part: _digest(part) for part in parts})
+        cached_body = _CachedBody(imported_robot.body, {part.absolute(): _digest(part) for part in parts})
     while len(_cached_bodies) >= _MAX_CACHED_BODIES:
         oldest_key = next(iter(_cached_bodies))
         _cached_bodies.pop(oldest_key, None)

@@ -162,13 +162,14 @@ def _find_named_feet(robot: Robot, feet: Sequence[str]) -> dict[Chain, list[int]
         body_colliders = [geom for geom in robot.colliders if model.geom_bodyid[geom] == body]
         if body_colliders:
             geoms_by_name[model.body(body).name] = body_colliders
-    foot_colliders = {}
+    foot_colliders: dict[Chain, list[int]] = {}
     for foot in feet:
         geoms = geoms_by_name[_check_name(foot, list(geoms_by_name), "foot")]
         chain = robot.chain_of_geom(geoms[0])
         if not chain:
             raise SpecError(f"foot {foot!r}: no joint lies between it and the torso")
-        foot_colliders[chain] = geoms
+        geoms_of_chain = foot_colliders.setdefault(chain, [])
+        geoms_of_chain.extend(geom for geom in geoms if geom not in geoms_of_chain)
     return foot_colliders
 
 

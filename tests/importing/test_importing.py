@@ -258,6 +258,28 @@ def test_feet_can_be_named_by_geom_or_body():
         import_robot(GO2, feet=["FL_claf"])
 
 
+def test_a_text_is_the_name_of_a_foot():
+    with pytest.raises(SpecError, match=r"go2_like\.xml: unknown foot 'FL_claf'; did you mean 'FL_calf'\?"):
+        import_robot(GO2, feet="FL_claf")
+
+
+def test_heel_and_toe_of_a_leg_are_one_foot(tmp_path):
+    text = GO2.read_text()
+    names = []
+    for leg in ("FL", "FR", "RL", "RR"):
+        foot = f'<geom name="{leg}" class="foot"'
+        assert foot in text
+        text = text.replace(foot, f'<geom name="{leg}_heel" class="foot" pos="-0.05 0 -0.213"/>{foot}')
+        names += [leg, f"{leg}_heel"]
+    path = tmp_path / "heels.xml"
+    path.write_text(text)
+    both, reverse, toes = (
+        [leg.foot_position for leg in import_robot(path, feet=feet).body.legs]
+        for feet in (names, names[::-1], names[::2])
+    )
+    assert both == reverse != toes
+
+
 def test_a_link_that_is_fixed_to_another_one_means_that_one(tmp_path):
     feet = ["FR", "FL", "RR", "RL"]
     links = [
@@ -310,6 +332,23 @@ def test_paths_are_bodies_everywhere_and_follow_the_file(tmp_path):
     assert registry.body_of(path).name == "other"
     with pytest.raises(OSError, match=r"^cannot read .*none\.urdf: no such file or directory$"):
         registry.body_of(str(tmp_path / "none.urdf"))
+
+
+def test_a_link_in_the_file_system_has_its_own_name_and_neighbors(tmp_path, monkeypatch):
+    box, mesh = '<geom type="box" size="0.19 0.0468 0.057"/>', '<geom type="mesh" mesh="shell"/>'
+    text = GO2.read_text().replace('<mujoco model="quadruped 15 kg">', "<mujoco>").replace(box, box + mesh)
+    for folder, radius in (("first", 0.05), ("second", 0.07)):
+        (tmp_path / folder).mkdir()
+        write_ball(tmp_path / folder / "shell.stl", radius)
+    first, second = tmp_path / "first" / "one.xml", tmp_path / "second" / "two.xml"
+    first.write_text(text.replace("<asset>", '<asset><mesh name="shell" file="shell.stl"/>'))
+    second.symlink_to(first)
+    for path, name in ((first, "one"), (second, "two")):
+        body = registry.body_of(path)
+        assert body == import_robot(path).body and body.name == name
+    assert registry.body_of(first).source != registry.body_of(second).source
+    monkeypatch.chdir(first.parent)
+    assert registry.body_of("one.xml") is registry.body_of(first)
 
 
 def test_all_files_that_a_robot_is_made_of_are_followed(tmp_path):
