@@ -6,7 +6,6 @@ that place goes straight on, z = e' + (d w + i r) e decays as exp((i r - d w) t)
 its velocity is taken from z. So steps of any length are exact, and no step is too long. web/swinging.js is a port.
 """
 
-import functools
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -72,7 +71,6 @@ class State(NamedTuple):
     ring: np.ndarray
 
 
-@functools.lru_cache(maxsize=8)
 def list_bones(body: Body) -> tuple[SwingingBone, ...]:
     """Return the bones of a body's ornaments."""
     return tuple(_make_bone(body, bone) for bone in visuals.bones(body))
@@ -191,7 +189,7 @@ class Swinging:
         """Return how bones are turned in the torso's frame, (4,) each.
 
         Args:
-            time: s, of the simulation; an earlier one than before begins anew.
+            time: s, of the simulation; an earlier one begins anew, and so does a jump of the torso at the same time.
             torso: (7,) position, m, and quaternion of the torso.
             arena: ground below it.
         """
@@ -199,7 +197,8 @@ class Swinging:
         ground = float(arena.height(*position[:2]))
         orientation = rotations.matrix(torso[3:7])
         anchors = [hold_mass(bone, position, orientation) for bone in self._bones]
-        if time < self._time:
+        has_jumped = time == self._time and not np.array_equal(anchors, [state.anchor for state in self._states])
+        if time < self._time or has_jumped:
             self._states = [rest(anchor) for anchor in anchors]
         elif time > self._time:
             seconds = time - self._time

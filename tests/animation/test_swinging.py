@@ -13,9 +13,13 @@ from arc_suite.animation.clips.meshes import part_meshes
 from arc_suite.animation.parts import describe_body
 from arc_suite.arenas import FLAT
 from arc_suite.bodies.families import sound_body, varied_body
+from arc_suite.bodies.generator import generate
 from arc_suite.models import swinging
+from arc_suite.models.visuals import VISUALS
+from arc_suite.models.visuals.spec import Bone, Visuals, whip
 from arc_suite.models.visuals.springs import SPRINGS
 from arc_suite.robots import ROBOTS
+from arc_suite.robots.spec import MATERIALS
 
 GENERATED = [*map(sound_body, range(4)), *map(varied_body, range(4))]
 BODIES = {body.name: body for body in (*ROBOTS.values(), *GENERATED)}
@@ -128,3 +132,22 @@ def test_pages_swing_bones_as_python_does(tmp_path):
         bone = pages.to_json_values(swinging.list_bones(body)[0], decimals=None)
         walks.append({"bone": bone, "times": times.tolist(), "poses": poses.tolist(), "ground": ground})
     np.testing.assert_allclose(nodes.run(script, walks), expected, atol=1e-9)
+
+
+def test_a_jump_at_the_same_time_begins_anew():
+    """As two resets in a row do: the bone hangs as it does without the first one."""
+    body = ROBOTS["queen"]
+    poses = standing(body, 20)
+    bones = swinging.Swinging(swinging.list_bones(body))
+    bones.follow(0.0, poses[0] + np.array((0.5, 0.2, 0.1, 0.0, 0.0, 0.0, 0.0)), FLAT)
+    turns = [bones.follow(STEP * row, pose, FLAT)[0] for row, pose in enumerate(poses)]
+    np.testing.assert_array_equal(turns, turned(body, poses))
+
+
+def test_bones_are_those_of_the_visuals_that_were_registered_last(monkeypatch):
+    body = generate(4, 2).replace(name="swinger")
+    colors = dict.fromkeys(MATERIALS, (0.5, 0.5, 0.5))
+    for name in ("tail", "mast"):
+        bone = Bone(name, "tail", (-0.1, 0.0, 0.05), (-0.3, 0.0, 0.2), 0.02, 0.01)
+        monkeypatch.setitem(VISUALS, body.name, Visuals(colors, ornaments=whip(bone, "shell", "glow"), bones=(bone,)))
+        assert [bone.name for bone in swinging.list_bones(body)] == [name]

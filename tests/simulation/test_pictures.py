@@ -16,7 +16,10 @@ from arc_suite.arenas import ARENAS, FLAT
 from arc_suite.bodies import generator
 from arc_suite.markers import Marker
 from arc_suite.models.outline import torso_box
+from arc_suite.models.visuals import VISUALS
+from arc_suite.models.visuals.spec import Visuals
 from arc_suite.robots import ROBOTS
+from arc_suite.robots.spec import MATERIALS
 from arc_suite.simulation.model import compile_model
 from arc_suite.simulation.physics import Physics
 from arc_suite.simulation.pictures import QUALITIES, Decorated, check_camera, picture
@@ -214,3 +217,15 @@ def test_a_restored_environment_shows_arrows_and_failed_legs_before_its_first_st
     other = arc_suite.load("queen", "limp")
     other.restore(environment.snapshot())
     np.testing.assert_array_equal(other.physics.render(120, 160), environment.physics.render(120, 160))
+
+
+def test_pictures_show_the_visuals_that_were_registered_last(monkeypatch):
+    body = generator.generate(4, 2).replace(name="painted")
+    model = compile_model(body, FLAT)
+    greens = []
+    for green in (0.0, 1.0):
+        colors = dict.fromkeys(MATERIALS, (1.0 - green, green, 0.0))
+        monkeypatch.setitem(VISUALS, body.name, Visuals(colors))
+        pixels = picture(body, FLAT, model.qpos0, 60, 80, "portrait").astype(int)
+        greens.append((pixels[..., 1] > pixels[..., 0] + 50).sum())
+    assert greens[0] < 20 < 200 < greens[1]

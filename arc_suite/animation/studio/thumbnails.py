@@ -9,6 +9,7 @@ from PIL import Image, ImageDraw
 
 from arc_suite.animation.clips.meshes import part_meshes
 from arc_suite.animation.parts import describe_body, part_frames
+from arc_suite.models import visuals
 from arc_suite.robots import palettes
 from arc_suite.robots.spec import Body
 
@@ -21,9 +22,14 @@ _LIGHT = np.array((0.3, -0.5, 0.8))  # direction of the light, from the body
 _SHADE = 0.45  # of a face that the light does not reach
 
 
-@functools.lru_cache(maxsize=64)
 def body_picture(body: Body) -> str:
     """Return a picture of a body as it stands, as a value of CSS."""
+    return _draw_body(body, visuals.looks_of(body))
+
+
+@functools.lru_cache(maxsize=64)
+def _draw_body(body: Body, looks: str) -> str:
+    """Return the picture of `body_picture`, the same one for the same `visuals.looks_of`."""
     triangles, colors = _body_triangles(body)
     camera = _CAMERA / np.linalg.norm(_CAMERA)
     right = np.cross((0.0, 0.0, 1.0), camera)

@@ -8,6 +8,9 @@ from PIL import Image
 
 from arc_suite.animation.studio import thumbnails
 from arc_suite.bodies import generator
+from arc_suite.models.visuals import VISUALS
+from arc_suite.models.visuals.spec import Visuals
+from arc_suite.robots.spec import MATERIALS
 
 
 def test_a_body_is_in_its_picture_in_its_colors():
@@ -27,3 +30,12 @@ def test_a_body_is_in_its_picture_in_its_colors():
 def test_a_palette_shows_its_colors_side_by_side():
     picture = thumbnails.palette_picture("moss")
     assert picture.startswith("linear-gradient(to right, rgb(107, 133, 71) 0% 20%, ") and picture.count("rgb") == 5
+
+
+def test_pictures_show_the_visuals_that_were_registered_last(monkeypatch):
+    body = generator.generate(4, 2).replace(name="painted")
+    pictures = set()
+    for color in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)):
+        monkeypatch.setitem(VISUALS, body.name, Visuals(dict.fromkeys(MATERIALS, color)))
+        pictures.add(thumbnails.body_picture(body))
+    assert len(pictures) == 2
