@@ -61,7 +61,7 @@ class BaseVectorEnv(gymnasium.vector.VectorEnv[Any, np.ndarray, np.ndarray]):
             AttributeError: there is no such attribute.
         """
         values = list(values) if isinstance(values, list | tuple) else [values]
-        if len(values) not in (1, self.num_envs) or any(value != values[0] for value in values):
+        if len(values) not in (1, self.num_envs) or not all(_are_equal(value, values[0]) for value in values):
             raise ValueError(
                 f"set_attr {name!r}: environments share it; expected one value for all, got {checks.preview(values)}"
             )
@@ -119,6 +119,13 @@ class BaseVectorEnv(gymnasium.vector.VectorEnv[Any, np.ndarray, np.ndarray]):
                     f"indices: expected integers from 0 to {self.num_envs - 1}, got {checks.preview(index)}"
                 )
         return indices
+
+
+def _are_equal(value: Any, other: Any) -> bool:
+    """Return whether two values, which may be arrays, are equal as a whole."""
+    if isinstance(value, np.ndarray) or isinstance(other, np.ndarray):
+        return np.array_equal(value, other)
+    return value == other
 
 
 def checked_task_kwargs(task_kwargs: Any) -> Mapping[str, Any]:

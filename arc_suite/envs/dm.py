@@ -20,7 +20,7 @@ from arc_suite.envs.calls import (
     checked_command,
     one_thread_at_a_time,
 )
-from arc_suite.envs.prepare import checked_changes, prepare_task, refuse_arguments
+from arc_suite.envs.prepare import checked_changes, prepare_task, refuse_arguments, stored_settings
 from arc_suite.envs.task_view import TaskView
 from arc_suite.envs.timestep import TimeStep
 from arc_suite.robots.spec import Body
@@ -93,7 +93,7 @@ def load(
     is_flat = checks.boolean("flat_observation", options.get("flat_observation", False))
     run = TaskRun(task, random, on_divergence, is_flat)
     run.visualize_reward = checks.boolean("visualize_reward", visualize_reward)
-    return Environment(Physics.from_body(task.scene.body, task.scene.arena), run, settings)
+    return Environment(Physics.from_body(task.scene.body, task.scene.arena), run, stored_settings(task, settings))
 
 
 class Environment(KnownAttributes, control.Environment):
@@ -102,7 +102,7 @@ class Environment(KnownAttributes, control.Environment):
     While one thread is in a step or reset, those of other threads raise RuntimeError. Any thread may set commands.
 
     Attributes:
-        task_kwargs: the settings with which `load` opened the task.
+        task_kwargs: the settings with which `load` opened the task; texts stand for files.
     """
 
     if TYPE_CHECKING:  # dm_env and dm_control leave these types open

@@ -1,5 +1,6 @@
 """Preparation of tasks for environments: the task with its body and arena, and the compiled model of both."""
 
+import copy
 import inspect
 import json
 import math
@@ -69,6 +70,20 @@ def prepare_task(
     if modifier_settings:
         task = modified_task.add_modifiers(task, modifier_settings)
     return task, model
+
+
+def stored_settings(task: Task, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings with which a task was made, as an environment keeps them to make it again with changes.
+
+    The caller may change its values and its files. So values are copied, and texts stand for files.
+    """
+    copied_settings = {name: copy.deepcopy(value) for name, value in settings.items() if name != "arena"}
+    if "arena" in settings:
+        copied_settings["arena"] = registry.arena_word(settings["arena"])
+    for name, file_setting in task.unwrapped.file_settings.items():
+        if name in copied_settings:
+            copied_settings[name] = file_setting.embed(copied_settings[name])
+    return copied_settings
 
 
 # Argument that only some of the functions which open environments have -> hint for the others, in their errors.

@@ -25,7 +25,7 @@ from arc_suite.envs.calls import (
     checked_command,
     one_thread_at_a_time,
 )
-from arc_suite.envs.prepare import checked_changes, checked_limit, prepare_task, refuse_arguments
+from arc_suite.envs.prepare import checked_changes, checked_limit, prepare_task, refuse_arguments, stored_settings
 from arc_suite.envs.task_view import TaskView
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import pictures
@@ -183,6 +183,7 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
 
         self.arguments = domain_name, task_name, task_kwargs
         self._tasks, model = self._prepare_tasks()
+        self.arguments = domain_name, task_name, stored_settings(self._tasks[0], task_kwargs)
         self._task = _join_tasks(self._tasks)
         any_model = model if isinstance(model, mujoco.MjModel) else model[0]
         pictures.check_camera(any_model, picture_options["camera_id"])

@@ -2,8 +2,10 @@
 
 import itertools
 import pickle
+from pathlib import Path
 
 import gymnasium
+import imageio.v3 as imageio
 import imports
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from refusals import refused
 from tiers import tiers, turns
 
 import arc_suite
+from arc_suite import motions
 from arc_suite.bodies import BodiesEnv
 from arc_suite.envs.gym import Env
 from arc_suite.envs.vector import VectorEnv
@@ -380,3 +383,60 @@ def test_seeds_that_go_on_beyond_the_last_one():
 def test_too_many_environments_of_different_bodies():
     with refused("num_envs: expected an integer from 1 to 1048576, got 1000000000"):
         BodiesEnv("walk", 10**9, "varied:0-1")
+
+
+def settings_of_next_episode(environment):
+    """Return the settings of an environment's episodes after the next reset."""
+    environment.reset()
+    definition = environment.task.definition
+    return definition.settings
+
+
+@pytest.mark.parametrize("make", [arc_suite.load, Env, lambda *setup: VectorEnv(*setup[:2], 2, task_kwargs=setup[2])])
+def test_settings_are_those_of_the_opening_whatever_the_caller_changes(make):
+    settings = {"weights": {"forward": 1.5}}
+    environment = make("queen", "walk", settings)
+    environment.reset()
+    settings["weights"]["forward"] = 7.0
+    environment.change_settings({"gait": "ripple"})
+    assert settings_of_next_episode(environment).weights["forward"] == 1.5
+
+
+def test_files_of_the_opening_need_not_stay(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    imageio.imwrite("hill.png", np.arange(64, dtype=np.uint8).reshape(8, 8))
+    walk = arc_suite.load("queen", "mimic", {"motion": "walk"}).task.definition.settings.motions[0]
+    motions.save(walk, "pace.npz")
+    hill, pace = {"arena": "hill.png:20x20x0.2"}, {"motion": "pace.npz"}
+    walking = [arc_suite.load("queen", "walk", hill), VectorEnv("queen", "walk", 2, task_kwargs=hill)]
+    following = arc_suite.load("queen", "mimic", pace)
+    Path("hill.png").unlink(), Path("pace.npz").unlink()
+    arena = walking[0].task.scene.arena
+    for environment in walking:
+        environment.change_settings({"gait": "ripple"})
+        assert settings_of_next_episode(environment).parameters.duty_factor > 0.7
+        assert environment.task.definition.scene.arena == arena
+    following.change_settings({"both_sides": False})
+    assert settings_of_next_episode(following).motions[0].name == walk.name
+
+
+def test_noise_of_level_0_is_none():
+    noise = {"posture": 0.0, "velocities": 1.0}
+    environment = VectorEnv("queen", "walk", 2, task_kwargs={"observation_noise": noise, "random": 0})
+    same = VectorEnv("queen", "walk", 2, task_kwargs={"observation_noise": {"velocities": 1.0}, "random": 0})
+    observations = []
+    for vector in (environment, same):
+        vector.reset()
+        vector.change_settings({"observation_noise": {"velocities": 2.0}}, mask=[False, True])
+        observations.append(vector.reset()[0])
+    np.testing.assert_array_equal(*observations)
+
+
+def test_attributes_of_arrays_are_compared_as_a_whole():
+    environment = VectorEnv("queen", "walk", 2)
+    with refused("set_attr 'render_mode': environments share it; expected one value for all", begins=True):
+        environment.set_attr("render_mode", ["a", np.array([1, 2])])
+    with refused("set_attr 'step_limit': environments share it; expected one value for all", begins=True):
+        environment.set_attr("step_limit", [np.array([1, 2]), np.array([1, 3])])
+    environment.set_attr("step_limit", [np.array([7, 8]), np.array([7, 8])])
+    assert environment.step_limit.tolist() == [7, 8]

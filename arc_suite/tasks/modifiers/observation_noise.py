@@ -35,8 +35,7 @@ class ObservationNoise(_ObservationNoiseFields, Modifier):
     """Uniform noise on what is measured.
 
     Attributes:
-        observation_noise: level of uniform noise on what is measured, for all blocks that declare
-            `noise`, or by the name of a block.
+        observation_noise: level of uniform noise by the name of each block that has some.
         widths: half-widths (size,) of the noise of each block that has some, by name.
         slices: slice of each of these blocks in the random numbers of a step, by name.
         total: how many random numbers a step has.
@@ -59,7 +58,7 @@ class ObservationNoise(_ObservationNoiseFields, Modifier):
         widths = {name: levels[name] * noisy[name].widths for name in names}
         slices_of_names = {name: slices_of_all[name] for name in names}
         total = max((part.stop for part in slices_of_names.values()), default=0)
-        return cls(levels, widths, slices_of_names, total)
+        return cls({name: levels[name] for name in names}, widths, slices_of_names, total)
 
     @classmethod
     def _check_levels(cls, value, noisy: Mapping[str, Block]) -> dict[str, float]:
