@@ -14,8 +14,8 @@ from arc_suite.robots.spec import Body
 SIZES = {"plane": 0, "box": 3, "sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "mesh": 0}  # numbers of a size
 
 _CELL = 1.0 / 16.0  # of the surface, standing heights
-_MAX_NODES = 320  # of the surface along either side, as each is measured by a ray
-_MAX_REACH = 60.0  # of the surface from the start, standing heights: commands lead no further in 1000 control steps
+_MAX_NODES = 641  # of the surface along either side, as each is measured by a ray
+_MAX_REACH = 120.0  # of the surface from the start, standing heights: the fastest walk leads 92 in 1000 control steps
 _MAX_LISTED = 2  # solids, whose pairs with the parts of a body are listed
 _DOWN = np.array((0.0, 0.0, -1.0))
 
@@ -149,21 +149,25 @@ def _compile(solids: Solids) -> mujoco.MjModel:
 
 
 def _bounds(solids: Solids, reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners (2,) of lowest and highest x and y, m, of what stands on the planes, up to a distance."""
+    """Return the corners (2,) of lowest and highest x and y, m, of what stands on the planes up to a distance.
+
+    Where nothing stands there, the corners are those of a square around the start.
+    """
     model = _compile(solids)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     is_solid = model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
-    if not is_solid.any():
-        return np.full(2, -1.0), np.full(2, 1.0)
     rotations = data.geom_xmat[is_solid].reshape(-1, 3, 3)
     boxes = model.geom_aabb[is_solid]  # center and half-sides in the frame of the geom
     centers = data.geom_xpos[is_solid] + np.einsum("nij,nj->ni", rotations, boxes[:, :3])
     halves = np.einsum("nij,nj->ni", abs(rotations), boxes[:, 3:])
     margin = 0.0 if not _planes(solids) else 1e-3
-    low = (centers - halves).min(axis=0)[:2] - margin
-    high = (centers + halves).max(axis=0)[:2] + margin
-    return low.clip(-reach, reach), high.clip(-reach, reach)
+    lows = (centers - halves)[:, :2] - margin
+    highs = (centers + halves)[:, :2] + margin
+    is_near = ((lows < reach) & (highs > -reach)).all(axis=1)
+    if not is_near.any():
+        return np.full(2, -1.0), np.full(2, 1.0)
+    return lows[is_near].min(axis=0).clip(-reach, reach), highs[is_near].max(axis=0).clip(-reach, reach)
 
 
 def _measure_heights(solids: Solids, x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -117,6 +117,37 @@ def test_a_scene_keeps_its_solids(tmp_path):
     assert_allclose(np.diff(ramp), 2.0 * np.tan(np.deg2rad(10.0)), rtol=1e-3)
 
 
+def scene_of(tmp_path, content):
+    """Return the ground of a scene for Tick."""
+    (tmp_path / "scene.xml").write_bytes(scene(content))
+    return registry.arena_of(str(tmp_path / "scene.xml"), TICK)
+
+
+def test_a_scene_reaches_as_far_as_a_walk(tmp_path):
+    arena = scene_of(tmp_path, '<geom type="box" size="50 50 .5" pos="0 0 -.5"/>')
+    longest_walk = 92.0 * HEIGHT  # m, of Tick in 1000 control steps
+    assert not arena.has_left(np.float64(longest_walk), np.float64(0.0))
+    assert arena.has_left(np.float64(50.0), np.float64(0.0))
+    arena = scene_of(tmp_path, '<geom type="plane" size="1 1 1"/><geom type="box" size="3 1 .04" pos="14 0 0"/>')
+    assert_allclose(arena.height(np.array([10.0, 14.0, 18.0]), np.zeros(3)), [0.0, 0.04, 0.0], atol=1e-9)
+
+
+@pytest.mark.parametrize("places", [("40 0 0",), ("0 -70 0",), ("40 0 0", "3 0 0")])
+def test_solids_beyond_the_reach_leave_the_plane_level(tmp_path, places):
+    boxes = "".join(f'<geom type="box" size="1 1 .1" pos="{place}"/>' for place in places)
+    arena = scene_of(tmp_path, '<geom type="plane" size="1 1 1"/>' + boxes)
+    assert_allclose(arena.height(np.array([0.0, -7.0, 9.0]), np.array([0.0, 5.0, 0.0])), 0.0, atol=1e-9)
+    expected = 0.1 if "3 0 0" in places else 0.0
+    assert_allclose(arena.height(np.float64(3.0), np.float64(0.0)), expected, atol=1e-9)
+
+
+def test_heights_of_a_scene_are_known_as_the_page_says(tmp_path):
+    cell = scene_of(tmp_path, '<geom type="box" size="3.4 3.4 .5"/>').surface.cell
+    assert max(cell) <= HEIGHT / 16.0  # m
+    cell = scene_of(tmp_path, '<geom type="box" size="50 50 .5"/>').surface.cell
+    assert_allclose(cell, 240.0 * HEIGHT / 640.0)
+
+
 def geoms(model):
     return [(model.geom(geom).name, model.geom_type[geom]) for geom in range(model.ngeom)]
 
