@@ -21,7 +21,8 @@ A task: its methods must return what the contract says, and its terms, blocks an
 environments must compute bit for bit what each computes alone, over 200 control steps; the line names the terms,
 metrics and blocks that differ.
 
-Exit status 1 if there is any flaw, fall, slow walk or difference.
+Exit status 1 if there is any flaw or difference, or if --walk ends in a fall or a slow walk. What --tasks tells does
+not count: few bodies walk well in all tasks.
 """
 
 from collections.abc import Sequence
