@@ -5,6 +5,7 @@ the same legs, joints and parts; see `kind`.
 """
 
 import dataclasses
+import sys
 from collections.abc import Hashable, Sequence
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 from arc_suite.envs import trees
 from arc_suite.tasks.clock import Clock, Clocks
 from arc_suite.tasks.contract import Task
+from arc_suite.tasks.readings import Layout
 
 # Names of settings that tasks compare with (..., legs) values: stacked, they need an axis of 1 for the legs.
 _COMPARED_WITH_FEET = ("stance_threshold",)
@@ -27,12 +29,18 @@ def kind(task: Task) -> Hashable | None:
     return (
         type(task),
         type(unwrapped),
-        repr(task.scene.layout),
+        _write_layout(task.scene.layout),
         task.scene.substeps,
         task.scene.arena,
         tuple(task.settings.weights),
         task.structure,
     )
+
+
+def _write_layout(layout: Layout) -> str:
+    """Return the text of a layout with all digits of its arrays, so that equal texts are equal layouts."""
+    with np.printoptions(floatmode="unique", threshold=sys.maxsize):
+        return repr(layout)
 
 
 def stack_tasks(tasks: Sequence[Task]) -> Task:

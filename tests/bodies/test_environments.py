@@ -24,6 +24,7 @@ from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import command, sensors
 from arc_suite.tasks.fitting import reach
+from arc_suite.tasks.readings import TorsoPlace
 from arc_suite.tasks.walk import Walk
 
 LAYOUTS = [
@@ -200,6 +201,17 @@ def test_a_task_that_inherits_shares_a_batch_only_if_it_declares_what_follows_fr
     task, _ = prepare_task(FEW[0], "walk")
     kinds = [stacked.kind(each(task.scene, task.settings)) for each in (Walk, Saunter, Stroll)]
     assert [found is None for found in kinds] == [False, True, False]
+
+
+def test_torsos_at_other_places_share_no_batch():
+    """All digits of a layout count, as all environments of a batch have that of the first one."""
+    task, _ = prepare_task(FEW[0], "walk")
+    kinds = []
+    for shift in (0.0, 0.0, 1e-10):
+        place = TorsoPlace(root=1, in_root=np.array((0.1 + shift, 0.0, 0.3)), in_torso=np.zeros(3))
+        scene = task.scene._replace(layout=task.scene.layout._replace(torso_place=place))
+        kinds.append(stacked.kind(Walk(scene, task.settings)))
+    assert kinds[0] == kinds[1] != kinds[2]
 
 
 def test_spaces_and_seeds():
