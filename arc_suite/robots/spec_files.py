@@ -51,7 +51,7 @@ _FILES_OF_RUNS = ("config.json", "policy.npz")
 _MAX_FILES = 1000  # of a folder, among which a body is sought
 _MAX_QUOTE = 40  # characters of a key in an error
 _MAX_DIGITS = 20  # of an integer that is read as such; longer ones are read as floats
-_LIST_OF_NUMBERS = re.compile(r"\[\s+([^\[\]{}\"]*?)\s+\]")
+_LIST_OF_NUMBERS = re.compile(r"\[\n\s*([^\[\]{}\"]*?)\s+\]")  # texts have no line breaks
 
 
 def load_body(path: str | os.PathLike[str]) -> Body:
@@ -106,12 +106,12 @@ def hint_in_folder(path: str | os.PathLike[str]) -> str:
 
 
 def save_body(body: Body, path: str | os.PathLike[str]) -> None:
-    """Write a body to a file; fields that are None stay None.
+    """Write a body to a file, atomically; fields that are None stay None.
 
     Raises:
         OSError: the file cannot be written.
     """
-    Path(path).write_text(body_to_json(body), encoding="utf-8")
+    files.write(path, body_to_json(body))
 
 
 def body_to_json(body: Body) -> str:

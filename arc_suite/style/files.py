@@ -41,7 +41,7 @@ class _OtherFormat(ValueError):
 
 
 def save(path: str | os.PathLike[str], tracks: Sequence[Track]) -> None:
-    """Write tracks of one setup.
+    """Write tracks of one setup, atomically.
 
     Raises:
         ValueError: no tracks, or tracks of several setups.
@@ -60,7 +60,7 @@ def save(path: str | os.PathLike[str], tracks: Sequence[Track]) -> None:
         fields = track._asdict()
         del fields["setup"]
         arrays |= _flatten({name: value for name, value in fields.items() if value is not None}, str(index))
-    with open(path, "wb") as file:
+    with files.writing(path) as temporary, open(temporary, "wb") as file:
         np.savez(file, **arrays)
 
 

@@ -1,9 +1,11 @@
 """Bodies as JSON: lossless both ways, and what is malformed gets one line that names the field."""
 
+import errno
 import json
 import math
 import re
 import tracemalloc
+from pathlib import Path
 
 import pytest
 from refusals import refused
@@ -266,3 +268,31 @@ def test_files_that_hold_no_body_are_named(tmp_path):
 def test_a_million_legs_are_counted_not_built():
     with pytest.raises(SpecError, match=r"^legs\[0\]: expected an object with the fields of a Leg, got a number$"):
         body_from_json('{"name": "a", "torso": ' + json.dumps(SOUND["torso"]) + ', "legs": [' + "1," * 999_999 + "1]}")
+
+
+def test_texts_with_brackets_come_back(tmp_path):
+    """Lists of numbers are on one line, texts that look like such lists stay as they are."""
+    text = "a [ 1  2 ] b, [  3 ]"
+    body = generator.generate(4, 2)
+    link = body.legs[0].links[0]
+    aliased_link = link.replace(joint=link.joint.replace(alias=text))
+    leg = body.legs[0].replace(links=(aliased_link, *body.legs[0].links[1:]))
+    body = body.replace(name="aliased", legs=(leg, *body.legs[1:]))
+    save_body(body, tmp_path / "body.json")
+    assert load_body(tmp_path / "body.json") == body
+    assert body.legs[0].joints[0].alias == text and '"mount": [0.' in (tmp_path / "body.json").read_text()
+
+
+def test_a_file_that_cannot_be_written_completely_stays_as_it_is(tmp_path, monkeypatch):
+    path = tmp_path / "body.json"
+    save_body(ROBOTS["tick"], path)
+
+    def write_half(self, text, **options):
+        with self.open("w", encoding="utf-8") as file:
+            file.write(text[: len(text) // 2])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", write_half)
+    with refused(f"cannot write {path}: no space left on device", OSError):
+        save_body(ROBOTS["queen"], path)
+    assert load_body(path) == ROBOTS["tick"] and [entry.name for entry in tmp_path.iterdir()] == ["body.json"]

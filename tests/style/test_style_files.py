@@ -1,5 +1,6 @@
 """Tracks on disk, bit-equal."""
 
+import errno
 import functools
 import io
 import zipfile
@@ -214,3 +215,18 @@ def test_headers_that_claim_what_the_file_does_not_hold_are_one_line(saved, tmp_
             claims.writestr(name, header(shape) + content[-288:] if name == "1/positions.npy" else content)
     with pytest.raises(ValueError, match=f"^{path}: not a file of tracks, or a damaged one: "):
         load(path)
+
+
+def test_a_file_that_cannot_be_written_completely_stays_as_it_is(leaper, tmp_path, monkeypatch):
+    path = tmp_path / "leaper.npz"
+    save(path, leaper[:1])
+    content = path.read_bytes()
+
+    def write_half(file, **arrays):
+        file.write(content[: len(content) // 2])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(np, "savez", write_half)
+    with refused(f"cannot write {path}: no space left on device", OSError):
+        save(path, leaper)
+    assert path.read_bytes() == content and list(tmp_path.iterdir()) == [path]
