@@ -63,8 +63,14 @@ class Limping(Stepping):
     """
 
     def __init__(self, task: Task, parameters: LimpingParameters):
-        """Fit the law to a task; see `CommandLaw`."""
+        """Fit the law to a task; see `CommandLaw`.
+
+        Raises:
+            ValueError: a body of one leg, which no other one can relieve.
+        """
         super().__init__(task, parameters.steps)
+        if len(self.rest_soles) == 1:
+            raise ValueError(f"preset: {task.scene.body.name} has one leg, and limping is for two or more; see braced")
         self.limping = parameters
         middle = self.rest_soles[:, :2].mean(axis=0)
         self.ways_from_legs = (middle - self.rest_soles[:, :2]) / (len(self.rest_soles) - 1)

@@ -4,7 +4,9 @@ import imports
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from refusals import refused
 
+from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator, limping
 from arc_suite.cpg.selection import presets_of, suited_preset
 from arc_suite.envs.setup import Setup
@@ -35,6 +37,15 @@ def test_imported_robots_limp_and_others_brace():
 )
 def test_a_leg_fails_whose_joints_err_more_than_all_others(errors, failure):
     assert_allclose(limping.find_failure(np.array([errors]) ** 2), [failure], atol=1e-12)
+
+
+def test_a_body_of_one_leg_cannot_limp():
+    body = generator.generate(4, 3)
+    task = Setup.of(body.replace(name="hopper", legs=body.legs[:1]), "limp").definition
+    with refused("preset: hopper has one leg, and limping is for two or more; see braced"):
+        limping.Limping(task, presets_of(QUADRUPED)["limping"])
+    two_legs = Setup.of(body.replace(name="biped", legs=body.legs[::2]), "limp").definition
+    assert np.isfinite(limping.Limping(two_legs, presets_of(QUADRUPED)["limping"]).ways_from_legs).all()
 
 
 @pytest.mark.slow
