@@ -118,7 +118,8 @@ def open_robot(path: Path, facing: Facing = LEVEL, scale: float = 1.0) -> RobotF
     visuals = Visuals()
     if text_length(meshes) < _MAX_TEXT_WITH_VISUALS:
         visuals = read_visuals(path, visual_element, model, torso, facing, scale)
-    all_notes = (*notes, *mesh_notes, *torso_notes, *mass_notes, *unit_notes, *inertia_notes, *lost_mesh_notes)
+    repair_notes = (*unit_notes, *visuals.notes, *inertia_notes)
+    all_notes = (*notes, *mesh_notes, *torso_notes, *mass_notes, *repair_notes, *lost_mesh_notes)
     all_parts = tuple(dict.fromkeys((*parts, *mesh_files, *visuals.files)))
     return RobotFile(
         model=model,

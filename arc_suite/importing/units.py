@@ -12,7 +12,7 @@ from arc_suite.importing.tree import Robot
 from arc_suite.models.standing import GRAVITY
 from arc_suite.robots.spec import MAX_LENGTH, SpecError
 
-_UNITS = {"inches": 0.0254, "cm": 0.01, "mm": 0.001}  # m, by name
+UNITS = {"inches": 0.0254, "cm": 0.01, "mm": 0.001}  # m, by name
 SCALE_RANGE = (1e-6, 1e6)
 
 # Mass by the cube of the standing height, kg/m^3: 4 to 1052 for 41 robots of others, mostly about 500.
@@ -90,24 +90,42 @@ def scale_inertias(spec: mujoco.MjSpec, model: mujoco.MjModel, torso: int, scale
 
 
 def repair_meshes(spec: mujoco.MjSpec, model: mujoco.MjModel, torso: int) -> tuple[mujoco.MjModel, tuple[str, ...]]:
-    """Return the model with meshes in the units of its joints, and a note if any were in other units."""
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    span = float(np.linalg.norm(np.ptp(data.xpos[model.body_rootid == torso], axis=0)))  # m
+    """Return the model with the robot's meshes in the units of its joints, and a note if any were in other units."""
     radii: dict[str, float] = {}
     for geom in range(model.ngeom):
-        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
+        is_of_robot = model.body_rootid[model.geom_bodyid[geom]] == torso  # and not of a scene, which may be large
+        if is_of_robot and model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
             name = model.mesh(int(model.geom_dataid[geom])).name
             radii[name] = float(model.geom_rbound[geom])
     largest = max(radii.values(), default=0.0)
-    if largest <= _MAX_MESH_RADIUS * span or span == 0.0:
+    unit = find_mesh_unit(model, torso, largest)
+    if unit is None:
         return model, ()
-    unit = _find_unit(_COMMON_MESH_RADIUS * span / largest)
     for name in radii:
-        spec.mesh(name).scale *= _UNITS[unit]
+        spec.mesh(name).scale *= UNITS[unit]
     with parsers.guard(f"MuJoCo cannot compile it with meshes in {unit}", raises=SpecError):
-        note = f"repaired: {len(radii)} meshes are in {unit}, as {largest:.3g} m is far beyond the joints"
-        return spec.compile(), (note,)
+        return spec.compile(), (describe_repair(f"{len(radii)} meshes", unit, largest),)
+
+
+def find_mesh_unit(model: mujoco.MjModel, torso: int, radius: float) -> str | None:
+    """Return the unit of a robot's meshes; None if they fit its joints.
+
+    Args:
+        model: model of the file.
+        torso: body of the torso.
+        radius: radius of the largest mesh, m.
+    """
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    span = float(np.linalg.norm(np.ptp(data.xpos[model.body_rootid == torso], axis=0)))  # m
+    if radius <= _MAX_MESH_RADIUS * span or span == 0.0:
+        return None
+    return _find_unit(_COMMON_MESH_RADIUS * span / radius)
+
+
+def describe_repair(meshes: str, unit: str, radius: float) -> str:
+    """Return a line on meshes that were in another unit, the largest of which has a radius, m."""
+    return f"repaired: {meshes} are in {unit}, as {radius:.3g} m is far beyond the joints"
 
 
 def unit_notes(robot: Robot, stance: Stance) -> tuple[str, ...]:
@@ -124,7 +142,7 @@ def unit_notes(robot: Robot, stance: Stance) -> tuple[str, ...]:
     line = ""
     if density < _MIN_DENSITY and has_common_gravity:
         unit = _find_unit((density / _COMMON_DENSITY) ** (1.0 / 3.0))
-        line = f"{size}: lengths in {unit}? --scale={_UNITS[unit]:g}"
+        line = f"{size}: lengths in {unit}? --scale={UNITS[unit]:g}"
     elif density > _MAX_DENSITY and has_common_gravity:
         line = f"{size}: masses in g?"
     if stance.height > MAX_LENGTH:
@@ -134,4 +152,4 @@ def unit_notes(robot: Robot, stance: Stance) -> tuple[str, ...]:
 
 def _find_unit(factor: float) -> str:
     """Return the unit whose length in m is nearest to a factor."""
-    return min(_UNITS, key=lambda unit: abs(math.log(_UNITS[unit] / factor)))
+    return min(UNITS, key=lambda unit: abs(math.log(UNITS[unit] / factor)))

@@ -1,6 +1,7 @@
 """What a robot's file shows of it, so that pictures, clips and pages show it: visual meshes, simplified, and shapes."""
 
 import contextlib
+import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -20,6 +21,7 @@ _MAX_POINTS = 8000  # of all meshes of a body, about 400 kB of its source
 _MIN_POINTS = 60  # of one mesh
 _FINEST_GRID = 256  # cells along the longest side of a mesh
 _MAX_SHAPES = 500  # with more, a robot shows its colliders
+_COMMON_SHARE = 0.1  # of the largest mesh's radius, m, that other meshes have
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
 # Kinds of shapes: names in MJCF, and how many numbers give their size.
 SHAPES = {
@@ -29,6 +31,18 @@ SHAPES = {
     mujoco.mjtGeom.mjGEOM_ELLIPSOID: ("ellipsoid", 3),
     mujoco.mjtGeom.mjGEOM_BOX: ("box", 3),
 }
+
+
+class Triangles(NamedTuple):
+    """A mesh.
+
+    Attributes:
+        points: (n, 3), m.
+        faces: (m, 3) indices of points, in the order that is seen from outside.
+    """
+
+    points: np.ndarray
+    faces: np.ndarray
 
 
 class Visual(NamedTuple):
@@ -77,12 +91,14 @@ class Visuals(NamedTuple):
         shapes: all others.
         files: files that were read, with files of materials that are missing.
         point_count: number of points in these files.
+        notes: a line if meshes were in other units.
     """
 
     meshes: tuple[Visual, ...] = ()
     shapes: tuple[VisualShape, ...] = ()
     files: tuple[Path, ...] = ()
     point_count: int = 0
+    notes: tuple[str, ...] = ()
 
     @property
     def bodies(self) -> set[int]:
@@ -195,12 +211,14 @@ def _collect_visuals(
     names = [spec_model.body(body).name for body in range(spec_model.nbody)]
     if names != [model.body(body).name for body in range(model.nbody)]:
         return Visuals()
+    shown_names = {name for geom, name in geoms if name and _find_root(spec_model, geom.id) == torso}
+    triangles, notes = _repair_units({name: triangles[name] for name in shown_names}, model, torso)
     whole_meshes = []
     shapes = []
     for (geom, mesh_name), color, is_of_file in zip(geoms, colors, has_color, strict=True):
-        body = int(spec_model.geom_bodyid[geom.id])
-        if spec_model.body_rootid[body] != torso:
+        if _find_root(spec_model, geom.id) != torso:
             continue
+        body = int(spec_model.geom_bodyid[geom.id])
         position, orientation = _find_place(spec_model, geom.id, facing if body == torso else LEVEL)
         if mesh_name:
             points, faces = triangles[mesh_name]
@@ -210,7 +228,29 @@ def _collect_visuals(
             kind = mujoco.mjtGeom(spec_model.geom_type[geom.id])
             shapes.append(VisualShape(body, kind, spec_model.geom_size[geom.id], position, orientation, color))
     point_count = sum(len(visual.points) for visual in whole_meshes)
-    return Visuals(_simplify_meshes(whole_meshes, point_count), tuple(shapes), point_count=point_count)
+    return Visuals(_simplify_meshes(whole_meshes, point_count), tuple(shapes), point_count=point_count, notes=notes)
+
+
+def _find_root(model: mujoco.MjModel, geom: int) -> int:
+    """Return the body of the world that carries a geom."""
+    return int(model.body_rootid[model.geom_bodyid[geom]])
+
+
+def _repair_units(
+    triangles: Mapping[str, Triangles], model: mujoco.MjModel, torso: int
+) -> tuple[Mapping[str, Triangles], tuple[str, ...]]:
+    """Return meshes by name in the units of the robot's joints, and a note if they were in other units."""
+    radii = {name: 0.5 * float(np.linalg.norm(np.ptp(points, axis=0))) for name, (points, _) in triangles.items()}
+    largest = max(radii.values(), default=0.0)
+    unit = units.find_mesh_unit(model, torso, largest)
+    if unit is None:
+        return triangles, ()
+    factor = units.UNITS[unit]
+    min_radius = _COMMON_SHARE * math.sqrt(factor) * largest  # midway from common meshes in m to those in the unit
+    large_triangles = {name: triangles[name] for name, radius in radii.items() if radius > min_radius}
+    small_triangles = {name: Triangles(points * factor, faces) for name, (points, faces) in large_triangles.items()}
+    note = units.describe_repair(f"{len(small_triangles)} visual meshes", unit, largest)
+    return {**triangles, **small_triangles}, (note,)
 
 
 def _find_place(model: mujoco.MjModel, geom: int, facing: Facing) -> tuple[np.ndarray, np.ndarray]:
@@ -219,13 +259,15 @@ def _find_place(model: mujoco.MjModel, geom: int, facing: Facing) -> tuple[np.nd
     return facing.rotation @ model.geom_pos[geom], orientation
 
 
-def _read_mesh(spec: mujoco.MjSpec, mesh) -> tuple[np.ndarray, np.ndarray]:
-    """Return the points (n, 3) and faces (m, 3) of a mesh, as the file places it."""
+def _read_mesh(spec: mujoco.MjSpec, mesh) -> Triangles:
+    """Return a mesh as the file places it."""
     whole_mesh = mujoco.MjSpec.from_file(str(file_of(spec, mesh))).meshes[0] if mesh.file else mesh
     points = np.array(whole_mesh.uservert, np.float32).reshape(-1, 3).astype(float)
     faces = np.array(whole_mesh.userface, np.int64).reshape(-1, 3)
     points = (points - mesh.refpos) @ rotations.matrix(mesh.refquat)
-    return points * mesh.scale, faces
+    if np.prod(mesh.scale) < 0.0:
+        faces = faces[:, ::-1]  # a mirror image would show its inside
+    return Triangles(points * mesh.scale, faces)
 
 
 def _simplify_meshes(meshes: Sequence[Visual], point_count: int) -> tuple[Visual, ...]:

@@ -2,6 +2,7 @@
 
 import importlib.util
 import pathlib
+import re
 import struct
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -96,6 +97,74 @@ def test_a_mesh_of_an_mjcf_file_stays_in_its_place(tmp_path):
     assert line in notes  # the shape is an ellipsoid
     points = WEDGE * (0.2, 0.2, 0.5) - (0.0, 0.0, 0.1)
     assert in_order(visual_points(body, "l1_link3")) == pytest.approx(in_order(points), abs=1e-3)
+
+
+def unit_notes(notes):
+    return [note for note in notes if note.startswith("repaired: ")]
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1000.0, "mm"), (100.0, "cm")])
+def test_a_mesh_in_another_unit_is_repaired_with_a_note(factor, unit, tmp_path):
+    path = write_urdf(tmp_path, factor * WEDGE)
+    body, notes = import_robot(path)
+    (note,) = unit_notes(notes)
+    assert note == f"repaired: 1 visual meshes are in {unit}, as {0.2062 * factor:.3g} m is far beyond the joints"
+    assert in_order(visual_points(body, "torso")) == pytest.approx(in_order(WEDGE + (0.1, 0.0, 0.0)), abs=1e-3)
+    path.write_text(path.read_text().replace('<box size="0.267 0.194 0.114"/>', '<mesh filename="trunk.stl"/>'))
+    body, notes = import_robot(path)
+    assert [re.sub(", as .*", "", note) for note in unit_notes(notes)] == [
+        f"repaired: 1 meshes are in {unit}",
+        f"repaired: 1 visual meshes are in {unit}",
+    ]
+    assert in_order(visual_points(body, "torso")) == pytest.approx(in_order(WEDGE + (0.1, 0.0, 0.0)), abs=1e-3)
+
+
+def test_a_mesh_in_the_unit_of_the_joints_stays_beside_one_in_another(tmp_path):
+    path = write_mjcf(tmp_path)
+    write_stl(tmp_path / "shin.stl", 1000.0 * WEDGE, FACES)
+    text = path.read_text().replace("<asset>", '<asset><mesh name="shin" file="shin.stl"/>')
+    shin = '<geom name="FR" class="foot"'
+    assert shin in text
+    path.write_text(text.replace(shin, f'<geom class="looks" type="mesh" mesh="shin"/>{shin}'))
+    body, notes = import_robot(path)
+    assert unit_notes(notes) == ["repaired: 1 visual meshes are in mm, as 206 m is far beyond the joints"]
+    assert in_order(visual_points(body, "r1_link3")) == pytest.approx(in_order(WEDGE), abs=1e-3)
+    points = WEDGE * (0.2, 0.2, 0.5) - (0.0, 0.0, 0.1)
+    assert in_order(visual_points(body, "l1_link3")) == pytest.approx(in_order(points), abs=1e-3)
+
+
+@pytest.mark.parametrize("attributes", ['class="looks"', ""], ids=["visual", "collider"])
+def test_a_large_mesh_of_a_scene_leaves_the_robots_meshes_alone(attributes, tmp_path):
+    path = write_mjcf(tmp_path)
+    body = import_robot(path).body
+    write_stl(tmp_path / "hill.stl", 1000.0 * WEDGE, FACES)
+    text = path.read_text().replace("<asset>", '<asset><mesh name="hill" file="hill.stl"/>')
+    path.write_text(text.replace("<worldbody>", f'<worldbody><geom {attributes} type="mesh" mesh="hill"/>'))
+    hilly_body, notes = import_robot(path)
+    assert unit_notes(notes) == [] and hilly_body.source == body.source
+
+
+def signed_volume(points, faces):
+    return sum(points[a] @ np.cross(points[b], points[c]) / 6.0 for a, b, c in faces)
+
+
+@pytest.mark.parametrize("signs", [(1, 1, 1), (1, -1, 1), (-1, -1, 1), (-1, -1, -1)])
+@pytest.mark.parametrize("kind", ["urdf", "mjcf"])
+def test_a_mirrored_mesh_shows_its_outside(kind, signs, tmp_path):
+    text_of_signs = " ".join(map(str, signs))
+    if kind == "urdf":
+        path, share = write_urdf(tmp_path, origin="0 0 0"), (1.0, 1.0, 1.0)
+        path.write_text(path.read_text().replace("trunk.stl", f'trunk.stl" scale="{text_of_signs}'))
+    else:
+        path, share = write_mjcf(tmp_path), (0.2, 0.2, 0.5)
+        scale = " ".join(str(sign * number) for sign, number in zip(signs, share, strict=True))
+        path.write_text(path.read_text().replace("0.2 0.2 0.5", scale).replace(' pos="0 0 -0.1"', ""))
+    mesh = ElementTree.fromstring(import_robot(path).body.source).find("asset/mesh")
+    points = np.array(mesh.get("vertex").split(), float).reshape(-1, 3)
+    faces = np.array(mesh.get("face").split(), int).reshape(-1, 3)
+    assert in_order(points) == pytest.approx(in_order(WEDGE * share * signs), abs=1e-3)
+    assert signed_volume(WEDGE, FACES) == pytest.approx(0.002)
+    assert signed_volume(points, faces) == pytest.approx(0.002 * np.prod(share), rel=0.01)
 
 
 def test_it_turns_and_grows_with_the_robot(tmp_path):
