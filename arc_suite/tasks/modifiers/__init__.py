@@ -70,6 +70,8 @@ MODIFIERS: dict[str, type[Modifier]] = {
 def fit_modifiers(settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]) -> tuple[Modifier, ...]:
     """Return the modifiers for some settings: all of the suite's, and those of other packages that have a setting here.
 
+    They act in the order in which they were registered.
+
     Args:
         settings: some of the settings in `MODIFIERS`, by name.
         body: the body of the task.
@@ -78,11 +80,10 @@ def fit_modifiers(settings: Mapping[str, Any], body: Body, blocks: Mapping[str, 
     Raises:
         ValueError: an unknown name, or a value that does not fit.
     """
-    modifiers = list(SUITE_MODIFIERS)
-    for name in settings:
-        modifier = MODIFIERS[checks.name(name, MODIFIERS, "modifier")]
-        if modifier not in modifiers:
-            modifiers.append(modifier)
+    chosen_modifiers = {MODIFIERS[checks.name(name, MODIFIERS, "modifier")] for name in settings}
+    chosen_modifiers.update(SUITE_MODIFIERS)
+    # In the order of registration, not of the settings: files sort these.
+    modifiers = [modifier for modifier in dict.fromkeys(MODIFIERS.values()) if modifier in chosen_modifiers]
     values: dict[str, Any] = {}
     for modifier in modifiers:
         values |= modifier.defaults
