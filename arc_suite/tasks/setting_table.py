@@ -129,8 +129,8 @@ def format_value(value: Any) -> str:
         return ", ".join(f"{name} {format_value(item)}" for name, item in value.items()) or "none"
     if value is None:
         return "none"
-    if isinstance(value, bool):
-        return str(value).lower()
+    if isinstance(value, bool | np.bool_):
+        return str(bool(value)).lower()
     if isinstance(value, str):
         return {"None": "none", "True": "true", "False": "false"}.get(value, value)
     return f"{float(value):.4g}"

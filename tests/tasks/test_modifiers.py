@@ -7,6 +7,7 @@ import pathlib
 import pickle
 import re
 import types
+from typing import ClassVar, NamedTuple
 
 import gaitless
 import gymnasium
@@ -22,6 +23,7 @@ from tiers import never, tiers, turn
 import arc_suite
 from arc_suite import policies, rotations
 from arc_suite.envs.prepare import prepare_task
+from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.models.outline import torso_box
 from arc_suite.models.sizing import GRAVITY
@@ -368,6 +370,13 @@ def test_a_limp_leg_has_no_motors_from_step_40_on(leg):
     assert environment.task.terms["control"] == (action**2).sum(), "the reward sees what was asked"
 
 
+def test_a_numpy_boolean_chooses_a_random_leg():
+    settings = Motors.defaults | {"actuator_failure": np.True_}
+    assert Motors.of(settings, ROBOTS["tick"], {}).actuator_failure is True
+    settings["actuator_failure"] = np.False_
+    assert Motors.of(settings, ROBOTS["tick"], {}).actuator_failure is False
+
+
 def test_each_episode_draws_a_leg_a_strength_a_friction_and_a_delay_of_its_own():
     ranges = {"motor_strength": (0.5, 1.0), "friction": (0.2, 1.0), "mass": (0.8, 2.0)}
     environment = load("leaper", actuator_failure=True, delay=(1, 3), **ranges)
@@ -574,6 +583,52 @@ def test_a_wrong_modifier_is_one_line(settings, message):
             use("tick", "walk", settings)
     with pytest.raises(ValueError, match="^unknown modifier 'kick'; did you mean 'kicks'"):
         modified_task.add_modifiers(prepare_task("tick", "walk")[0], {"kick": 1.0})
+
+
+class Scaled(NamedTuple("Scaled", [("scaling", float)]), modifiers.Modifier):
+    """Multiplies actions."""
+
+    __slots__ = ()
+    defaults: ClassVar = {"zscaling": 1.0}
+    bounds: ClassVar = {"zscaling": (0.0, 2.0)}
+
+    @classmethod
+    def of(cls, settings, body, blocks):
+        return cls(cls.check_number("zscaling", settings))
+
+    def act(self, state, action, elapsed):
+        return state, action * self.scaling
+
+
+class Shifted(NamedTuple("Shifted", [("shift", float)]), modifiers.Modifier):
+    """Adds to actions."""
+
+    __slots__ = ()
+    defaults: ClassVar = {"ashift": 0.0}
+    bounds: ClassVar = {"ashift": (0.0, 2.0)}
+
+    @classmethod
+    def of(cls, settings, body, blocks):
+        return cls(cls.check_number("ashift", settings))
+
+    def act(self, state, action, elapsed):
+        return state, action + self.shift
+
+
+def test_modifiers_of_other_packages_act_in_the_order_of_registration(monkeypatch):
+    for modifier in (Scaled, Shifted):
+        for name in modifier.defaults:
+            monkeypatch.setitem(modifiers.MODIFIERS, name, modifier)
+    settings = {"zscaling": 0.5, "ashift": 0.4}
+    turned_round = dict(reversed(settings.items()))
+    setup = Setup.of("tick", "walk", settings)
+    for environment in (
+        arc_suite.load("tick", "walk", settings),
+        arc_suite.load("tick", "walk", turned_round),
+        setup.load(),
+    ):
+        changes = environment.task.definition.changes
+        assert [type(change) for change in changes][-2:] == [Scaled, Shifted]
 
 
 GUIDE = (pathlib.Path(__file__).parents[2] / "docs" / "modifiers.md").read_text()

@@ -78,8 +78,10 @@ class Motors(_MotorsFields, Modifier):
     def of(cls, settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]) -> Self:
         """Return the modifier that settings ask for."""
         failure = settings["actuator_failure"]
-        if not isinstance(failure, bool):
-            checks.integer("actuator_failure", failure, 0, len(body.legs) - 1)
+        if isinstance(failure, bool | np.bool_):
+            failure = bool(failure)
+        else:
+            failure = checks.integer("actuator_failure", failure, 0, len(body.legs) - 1)
         return cls(
             motor_strength=cls.check_span("motor_strength", settings),
             joint_strength=cls.check_span("joint_strength", settings),
