@@ -186,7 +186,8 @@ class Environment(KnownAttributes, control.Environment):
         """Set settings of the task from the next reset on.
 
         They replace values of `task_kwargs` and of earlier calls. A setting is refused if it would change the arena,
-        the observation, or the presence of kicks and other modifiers. `level` restarts the curriculum at that level.
+        the observation, or the presence of a curriculum, of kicks or of other modifiers. `level` restarts the
+        curriculum at that level.
 
         Args:
             settings: some of `task_kwargs`.

@@ -178,6 +178,7 @@ _CONSTANT_PROPERTIES = {
     "motors, senses or kicks": lambda task: (type(task), task.structure),
     "ground": lambda task: task.scene.arena,
     "observation": lambda task: task.sizes,
+    "curriculum": lambda task: task.adapts,
 }
 
 

@@ -392,7 +392,8 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         """Set settings of the task of some environments, from their next reset on.
 
         They replace values of `task_kwargs` and of earlier calls. A setting is refused if it would change the arena,
-        the observation, or the presence of kicks and other modifiers. `level` restarts the curriculum at that level.
+        the observation, or the presence of a curriculum, of kicks or of other modifiers. `level` restarts the
+        curriculum at that level.
 
         Args:
             settings: some of `task_kwargs`.

@@ -226,6 +226,21 @@ def test_settings_that_do_not_fit(settings, message):
             each.change_settings(settings)
 
 
+def test_a_curriculum_neither_begins_nor_ends():
+    settings = {"commands": {"forward": [-1.0, 2.0]}, "curriculum": True}
+    vector, singles = both("steer")
+    widening = arc_suite.load("tick", "steer", settings)
+    cases = ((vector, settings), (singles[0], settings), (widening, {"curriculum": False}))
+    for environment, changes in cases:
+        message = "they would change the curriculum, which environments keep; open another environment with them"
+        with pytest.raises(ValueError, match=message):
+            environment.change_settings(changes)
+        environment.reset()
+    widening.change_settings({"curriculum": True, "level": 3})
+    widening.reset()
+    assert widening.task.progress["level"] == 3.0
+
+
 def test_settings_hold_from_the_next_reset_on():
     single = Env("tick", "walk")
     single.reset(seed=0)
