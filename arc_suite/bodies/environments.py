@@ -275,13 +275,19 @@ class BodiesEnv(KnownAttributes, BaseVectorEnv):
         """Set a command of the task in some environments; see `VectorEnv.command`."""
         self._check_open("command")
         mask = self._checked_mask(mask, "mask")
+        # A name such as that of a gait stands for other numbers, or for more of them, on another body.
+        values_by_task: dict[int, np.ndarray] = {}
         for task in {id(self.tasks[index]): self.tasks[index] for index in np.flatnonzero(mask)}.values():
-            values = checked_command(task, name, value, (self.num_envs,))
+            values_by_task[id(task)] = checked_command(task, name, value, (self.num_envs,))
         if not self._begun:
             raise ResetNeeded(f"cannot set command {name!r}: no episode has begun; call reset first")
         for group, indices, _ in self._places:
             if mask[indices].any():
-                group.command(name, values[indices], mask[indices])
+                values = np.full((len(indices), self.tasks[indices[0]].commands[name]), np.nan)
+                for row in np.flatnonzero(mask[indices]):
+                    index = indices[row]
+                    values[row] = values_by_task[id(self.tasks[index])][index]
+                group.command(name, values, mask[indices])
 
     @one_thread_at_a_time
     def change_model(self, fields: Mapping[str, Any], mask=None) -> None:

@@ -267,6 +267,22 @@ def test_commands_reach_the_environments_of_a_mask():
         env.command("comand", None)
 
 
+@pytest.mark.parametrize(("bodies", "gait"), [(("varied:1", "varied:2"), "walk"), (("queen", "leaper"), "wave")])
+def test_a_gait_by_name_is_that_of_each_body(bodies, gait):
+    env = BodiesEnv("directed", 3, [*bodies])
+    env.reset(seed=0)
+    env.command("gait", gait, [True, True, False])
+    observation = env.step(np.zeros(env.action_space.shape))[0]
+    for index, body in enumerate((*bodies, bodies[0])):
+        single = VectorEnv(body, "directed", 1, task_kwargs={"actions": "position"})
+        single.reset(seed=index)
+        if index < 2:
+            single.command("gait", gait)
+        expected = single.step(np.zeros(single.action_space.shape))[0][0]
+        assert_array_equal(env.own_observations()[index], expected)
+    assert all(np.isfinite(block).all() for block in observation.values())
+
+
 @pytest.mark.parametrize("mode", ["NextStep", pytest.param("SameStep", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     "duplicate",
