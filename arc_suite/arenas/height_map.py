@@ -62,12 +62,12 @@ class MapGround(Mapped):
 
     @functools.cached_property
     def _nodes(self) -> np.ndarray:
-        """The heights (rows, columns) from 0 to 1, in cells that are not too small."""
+        """The heights (rows, columns) from 0 to 1, in cells that are not too small; 0 for a map of height 0."""
         rows, columns = self.map.shape
-        length, width, _ = self.map.size
+        length, width, height = self.map.size
         min_cell = _MIN_CELL * self.unit
         shape = (min(rows, int(width / min_cell) + 1), min(columns, int(length / min_cell) + 1))
-        return sample(decode(self.map.heights, self.map.shape), shape)
+        return sample(decode(self.map.heights, self.map.shape), shape) * (height > 0.0)
 
     @functools.cached_property
     def _shares(self) -> np.ndarray:
@@ -78,7 +78,7 @@ class MapGround(Mapped):
 
     @functools.cached_property
     def _rise(self) -> float:
-        """The height of the highest node over the lowest, m; 1 in place of 0, which MuJoCo refuses."""
+        """The height of the highest node over the lowest, m; 1 for level ground, as MuJoCo refuses 0."""
         return float(np.ptp(self._nodes) * self.map.size[2]) or 1.0
 
     @functools.cached_property
