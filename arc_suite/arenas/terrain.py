@@ -31,7 +31,7 @@ _BACK_ALONE = 60.0  # level ground behind the start
 _LANES_ALONE = 5
 _CELL = 0.5  # of the height field
 _GRAIN = 1.0 / 16.0  # length of a cell of stairs and trenches; it is adapted so that a width is a multiple
-_THICKNESS = 2.0  # of the ground
+_THICKNESS = 2.0  # of the ground; boxes that are higher over the plane below them reach down to it
 _TRENCH_DEPTH = 0.6
 _HURDLE_GRAINS = 4  # length of a hurdle in cells; points of a height scan are nearer to each other
 _RUN_UP = (7.0, 9.0)  # level ground before a trench or hurdle to leap over
@@ -183,10 +183,11 @@ class Terrain(Arena):
         needs fewer boxes and less time.
         """
         for top in np.unique(heights[heights > self._bottom]):
+            thickness = max(_THICKNESS, top - self._bottom)
             edges = np.flatnonzero(np.diff(heights >= top, prepend=False, append=False))
             for first, last in edges.reshape(-1, 2) * self._grain:
-                size = np.array((0.5 * (last - first), 0.5 * WIDTH, 0.5 * _THICKNESS)) * self.unit
-                center = np.array((0.5 * (first + last) - self.back, 0.0, top - 0.5 * _THICKNESS)) * self.unit
+                size = np.array((0.5 * (last - first), 0.5 * WIDTH, 0.5 * thickness)) * self.unit
+                center = np.array((0.5 * (first + last) - self.back, 0.0, top - 0.5 * thickness)) * self.unit
                 yield size, center + (0.0, self.start(lane), 0.0)
 
     def height(self, x, y):

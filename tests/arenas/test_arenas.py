@@ -32,6 +32,22 @@ def test_height_is_that_of_rays(arena, body):
     assert place.is_level == (np.ptp(heights) == 0.0)
 
 
+@pytest.mark.parametrize(("task", "rise"), [("leap", 1.0), ("stairs", 0.5), ("leap", 0.05)])
+def test_obstacles_stand_on_the_ground(task, rise):
+    """A ray over the ground, half a millimeter above it, meets the first obstacle, however high this one is."""
+    environment = arc_suite.load("tick", task, {"rise": rise, "random": 0})
+    arena, model, data = environment.task.scene.arena, environment.physics.model.ptr, environment.physics.data.ptr
+    data.qpos[2] = 1e3
+    mujoco.mj_forward(model, data)
+    y = arena.start(len(arena.lanes) - 1)
+    x = np.linspace(0.0, arena.length * arena.unit, 20000)
+    first_x = x[np.argmax(arena.height(x, np.full_like(x, y)) > 0.0)]
+    for z in np.linspace(5e-4, 0.9 * rise, 7):
+        start = np.array([0.0, y, z])
+        distance = mujoco.mj_ray(model, data, start, np.array([1.0, 0.0, 0.0]), None, 1, -1, np.zeros(1, np.int32))
+        assert abs(distance - first_x) < 0.01, z
+
+
 def test_bumps_are_gentle_and_go_on_beyond_their_edge():
     bumps = ARENAS["bumps"](ROBOTS["queen"])
     far = np.array([1e3, -1e3])
