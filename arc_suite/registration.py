@@ -11,6 +11,7 @@ from arc_suite.arenas import ARENAS
 from arc_suite.cpg.law import Law
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.cpg.selection import LAWS, SUITE_PRESETS, law
+from arc_suite.envs import setup_facts
 from arc_suite.envs.prepare import prepare_task
 from arc_suite.models.visuals import VISUALS
 from arc_suite.models.visuals.spec import Visuals
@@ -144,7 +145,9 @@ def register(
     }
 
     if body is not None:
-        _register_body(body, parameters or {}, presets, visuals, {**LAWS, **law_by_preset_class})
+        all_tasks = {**TASKS, **additions_by_kind.get("task", {})}
+        all_laws = {**LAWS, **law_by_preset_class}
+        _register_body(body, parameters or {}, presets, visuals, all_tasks, all_laws)
         MODULE_OF_NAME["robot", body.name] = module
     elif not (parameters is None and presets is None and visuals is None):
         raise ValueError("parameters, presets and visuals belong to a body, and none is given")
@@ -156,6 +159,8 @@ def register(
     for kind, additions in additions_by_kind.items():
         _TABLES[kind].update(additions)
         MODULE_OF_NAME.update({(kind, name): module for name in additions})
+    for function_of_names in (registry.distinct_name, setup_facts.describe):
+        function_of_names.cache_clear()  # a body of an earlier call may share its name with the new one
     register_ids()
 
 
@@ -297,7 +302,12 @@ def _modifier_settings(modifier) -> Mapping[str, Any]:
 
 
 def _register_body(
-    body: Body, parameters: Mapping[str, Any], presets: Any, visuals: Visuals | None, laws: Mapping[type, Any]
+    body: Body,
+    parameters: Mapping[str, Any],
+    presets: Any,
+    visuals: Visuals | None,
+    tasks: Mapping[str, type[Task]],
+    laws: Mapping[type, Any],
 ) -> None:
     """Check a robot and all that belongs to it, then put it into the tables.
 
@@ -306,6 +316,7 @@ def _register_body(
         parameters: see `register`.
         presets: see `register`.
         visuals: see `register`.
+        tasks: all tasks by name, those of the same registration included.
         laws: all laws by class of their presets, those of the same registration included.
 
     Raises:
@@ -318,7 +329,9 @@ def _register_body(
     if ROBOTS.get(body.name, body) != body:
         raise ValueError(f"robot {body.name!r} is already registered")
     for task, task_parameters in parameters.items():
-        _check_parameters(body, checks.name(task, TASKS, "task of parameters"), task_parameters)
+        task_class = tasks[checks.name(task, tasks, "task of parameters")]
+        if task_parameters is not None:
+            _check_parameters(body, task_class, checks.mapping(f"parameters of {task}", task_parameters))
     if presets is not None:
         _check_presets(body, parameters.get("walk", {}), presets, laws)
 
@@ -332,15 +345,15 @@ def _register_body(
         VISUALS[body.name] = visuals
 
 
-def _check_parameters(body: Body, task: str, parameters: Mapping[str, Any]) -> None:
+def _check_parameters(body: Body, task: type[Task], parameters: Mapping[str, Any]) -> None:
     """Raise ValueError for a robot's parameters of a task that are incomplete or do not fit the body."""
-    if task == "walk":
+    if task.name == "walk":
         required_names = PARAMETERS["walk"]["queen"].keys() - {"weights", *SHARED_NOISE}
         missing = sorted(required_names - parameters.keys())
         if missing:
             cure = "give them too, or leave out the table, which is then fitted to the body"
-            raise ValueError(f"parameters of {task}: {body.name} has no {' and no '.join(missing)}; {cure}")
-    TASKS[task].settings_for(body, parameters)
+            raise ValueError(f"parameters of {task.name}: {body.name} has no {' and no '.join(missing)}; {cure}")
+    task.settings_for(body, parameters)
 
 
 def _check_presets(

@@ -290,6 +290,11 @@ class Misnamed(Walk):
         (walk({"base_noise": 0.1, **ROW, "duty_factor": 2}), "duty_factor: expected a number from 0 to 1, got 2"),
         (walk(WITHOUT_BANDS), "parameters of walk: other has no healthy_range and no velocity_band"),
         (walk(ROW | {"weights": {"contrl": 1.0}}), "unknown term of weights 'contrl'; did you mean 'control'?"),
+        (walk([ROW]), "parameters of walk: expected a mapping of names to values, got [{'target_velocity': "),
+        (
+            {"body": OTHER, "parameters": {"steer": 3}},
+            "parameters of steer: expected a mapping of names to values, got",
+        ),
         ({"body": OTHER, "parameters": {"wlak": ROW}}, "unknown task of parameters 'wlak'; did you mean 'walk'?"),
         (presets(**PRESETS["leaper"]), "preset 'slow': preset: other has 6 legs, and phase_offsets is for 4"),
         (presets(**PRESETS["bastion"]), "preset 'slow': preset: does not fit other: KeyError: 'knee'"),
@@ -364,7 +369,8 @@ def test_mistakes_are_one_line_and_register_nothing(arguments, message):
 @pytest.fixture
 def _restored_tables():
     """Takes back what a test registers."""
-    tables = (TASKS, ARENAS, LAWS, registry.ADDITIONS["law"], registry.MODULE_OF_NAME, gymnasium.registry)
+    additions = registry.ADDITIONS["law"]
+    tables = (TASKS, ARENAS, LAWS, additions, registry.MODULE_OF_NAME, gymnasium.registry, ROBOTS, PARAMETERS)
     before = [dict(table) for table in tables]
     yield
     for table, entries in zip(tables, before, strict=True):
@@ -392,6 +398,23 @@ def test_a_part_that_is_edited_and_registered_again_replaces_its_earlier_version
     other = type("OtherEdited", (Walk,), {"name": "edited"})
     with refused("task 'edited' is already registered; choose another name"):
         arc_suite.register(tasks=(other,))
+
+
+@pytest.mark.usefixtures("_restored_tables")
+def test_a_robot_has_parameters_of_a_task_of_the_same_call():
+    strolls = type("Strolls", (Walk,), {"name": "strolls"})
+    slow = {"target_velocity": 0.2}
+    arc_suite.register(body=OTHER, parameters={"strolls": slow, "walk": None}, tasks=(strolls,))
+    assert PARAMETERS["strolls"] == {"other": slow} and "other" not in PARAMETERS["walk"]
+    arc_suite.load("other", "strolls")
+
+
+@pytest.mark.usefixtures("_restored_tables")
+def test_a_body_has_another_name_once_a_robot_has_its_own():
+    body = TICK.replace(name="zork", density=2.0 * TICK.density)
+    assert registry.distinct_name(body) == "zork"
+    arc_suite.register(body=TICK.replace(name="zork"))
+    assert re.fullmatch(r"zork_[0-9a-f]{6}", registry.distinct_name(body))
 
 
 @pytest.mark.filterwarnings("ignore:.*out of date")
