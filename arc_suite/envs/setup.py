@@ -103,7 +103,7 @@ class Setup:
             raise ValueError(f"setting 'random': expected none, as every episode has a seed, got {random}")
         if has_several_bodies:
             checks.name(settings.get("actions", "position"), ["position"], "actions of different bodies")
-        if isinstance(settings.get("arena"), str):
+        if isinstance(settings.get("arena"), str | os.PathLike):
             settings["arena"] = registry.arena_word(settings["arena"])
             registry.arena_maker(settings["arena"])  # raises an error for an unknown name
         for task in tasks:
@@ -235,9 +235,15 @@ class Setup:
     def learning(self) -> "Setup":
         """Return the setup to learn in: with the settings that the task has for training, unless they are set.
 
-        Policies are judged in the setup itself.
+        Several tasks have those in which all of them agree. Policies are judged in the setup itself.
         """
-        return self.with_settings({**self.kind.training, **self.task_kwargs})
+        tasks = registry.tasks_of(self.task)
+        settings = {
+            name: value
+            for name, value in self.kind.training.items()
+            if all(task.training.get(name) == value for task in tasks)
+        }
+        return self.with_settings({**settings, **self.task_kwargs})
 
     def validation(self, count: int) -> "Setup":
         """Return the setup for evaluations of a policy while it learns.

@@ -129,6 +129,15 @@ def test_settings_of_a_setup_change_and_go():
     assert Setup.of("queen,tick", "rough").judging() == Setup.of("queen,tick", "rough")
 
 
+@pytest.mark.parametrize("tasks", ["recover,walk", "walk,recover"])
+def test_several_tasks_learn_in_the_settings_of_all(tasks):
+    setup = Setup.of("varied:0-1", tasks)
+    assert setup.learning().task_kwargs == {}
+    with pytest.raises(ValueError, match="^task recover: expected the blocks posture,"):  # not its own settings
+        setup.learning().make_vec(4)
+    assert Setup.of("queen", "recover").learning().task_kwargs == {"fall_seed": 1, "time_limit": 10.0}
+
+
 def test_names_of_several_bodies(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("a,b.json").write_text("{}")
