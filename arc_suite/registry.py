@@ -411,7 +411,7 @@ def split_task_names(names: Any) -> list:
     return names.split(",") if isinstance(names, str) else [names]
 
 
-def arena_of(arena: str | Arena, body: Body) -> Arena:
+def arena_of(arena: str | os.PathLike[str] | Arena, body: Body) -> Arena:
     """Return the arena of a word in a size that suits a body; an `Arena` is returned as it is.
 
     Raises:
@@ -429,7 +429,7 @@ def arena_of(arena: str | Arena, body: Body) -> Arena:
     return ground
 
 
-def arena_maker(arena: str) -> Callable[[Body], Arena]:
+def arena_maker(arena: str | os.PathLike[str]) -> Callable[[Body], Arena]:
     """Return the function from a body to the arena that a word stands for.
 
     Args:
@@ -448,16 +448,17 @@ def arena_maker(arena: str) -> Callable[[Body], Arena]:
     return _look_up(word, ARENAS, "arena")
 
 
-def arena_word(arena: str) -> str:
+def arena_word(arena: str | os.PathLike[str]) -> str:
     """Return the word for an arena that files may contain: ground as text in place of its file.
 
     Raises:
         ValueError: as `arena_maker`.
         OSError: as `arena_maker`.
     """
-    ground_file = _ground_file(arena)
+    word = os.fspath(arena) if isinstance(arena, os.PathLike) else arena
+    ground_file = _ground_file(word)
     if ground_file is None:
-        return arena
+        return word
     path, scale = ground_file
     reader = GROUND_READERS.get(path.suffix.lower())
     if reader is None:

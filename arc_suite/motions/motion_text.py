@@ -4,6 +4,7 @@ import base64
 import functools
 import json
 import math
+import os
 import zlib
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -56,12 +57,14 @@ def from_text(text: str) -> Motion:
 
 
 def read(word: Any) -> Motion:
-    """Return the motion of a file's path, or of a text.
+    """Return the motion of a file's path, a text or an `os.PathLike`, or of a motion as text.
 
     Raises:
         ValueError: no path, or a file or a text without a motion.
         OSError: the file cannot be read.
     """
+    if isinstance(word, os.PathLike):
+        return load(word)
     if not isinstance(word, str):
         raise ValueError(f"motion: expected the path of a file or a motion as text, got {checks.preview(word)}")
     return from_text(word) if is_text(word) else load(word)
@@ -81,6 +84,8 @@ def names_file(words: Any) -> bool:
     """Return whether a word, or one of a list, is the path of a file."""
     if isinstance(words, list | tuple):
         return any(map(names_file, words))
+    if isinstance(words, os.PathLike):
+        return True
     return isinstance(words, str) and words.endswith(EXTENSION) and not is_text(words)
 
 

@@ -12,6 +12,7 @@ one that swings.
 
 import functools
 import math
+import os
 from collections.abc import Mapping
 from typing import Any, ClassVar, NamedTuple
 
@@ -431,7 +432,7 @@ def _sets_noise(overrides: Mapping[str, Any], name: str) -> bool:
 
 def _read_motions(body: Body, walk: Parameters, setting: Any) -> tuple[Motion, ...]:
     """Return the motions of a body, given the setting `motion`: a text or a list of texts; see `Mimic.settings_for`."""
-    texts = [setting] if isinstance(setting, str) else setting
+    texts = [setting] if isinstance(setting, str | os.PathLike) else setting
     if not isinstance(texts, list | tuple) or not 0 < len(texts) <= _MAX_MOTIONS:
         raise ValueError(f"motion: expected a motion, or a list of up to {_MAX_MOTIONS}, got {checks.preview(texts)}")
     motions = []

@@ -105,6 +105,24 @@ def test_maps_of_eight_bits_and_level_ones_and_large_ones(tmp_path):
     assert registry.arena_of(f"{tmp_path}/level.png:9x7x1", ROBOTS["queen"]).surface.heights.shape == (150, 193)
 
 
+def test_a_map_of_height_0_is_level(tmp_path):
+    word = ground_files.write_png(tmp_path / "hill.png").removesuffix("0.5") + "0"
+    arena = registry.arena_of(word, TICK)
+    points = np.random.RandomState(0).uniform(-4.0, 4.0, (100, 2))
+    assert not arena.height(points[:, 0], points[:, 1]).any()
+    model = mujoco.MjModel.from_xml_string(models.assemble(TICK, arena).to_xml_string())
+    rays.assert_heights(arena, model, points, HEIGHT)
+
+
+def test_a_path_stands_for_its_file(tmp_path):
+    path = tmp_path / "hill.obj"
+    word = ground_files.write_obj(path)
+    settings = {"arena": path}
+    for environment in (arc_suite.load("tick", "walk", settings), VectorEnv("tick", "walk", task_kwargs=settings)):
+        assert environment.task.definition.scene.arena == registry.arena_of(word, TICK)
+    assert Setup.of("tick", "walk", {"arena": path}) == Setup.of("tick", "walk", {"arena": word})
+
+
 def test_a_scene_keeps_its_solids(tmp_path):
     arena = registry.arena_of(ground_files.write_yard(tmp_path / "yard.xml"), TICK)
     model = model_of(arena)

@@ -192,6 +192,9 @@ def test_settings_hold_the_motion_of_a_file(tmp_path):
     path = tmp_path / "nod.npz"
     motions.save(nod(), path)
     setup = Setup.of("tick", "mimic", {"motion": str(path)})
+    assert Setup.of("tick", "mimic", {"motion": path}) == setup
+    (motion,) = arc_suite.load("tick", "mimic", {"motion": path}).task.definition.settings.motions
+    assert motion_text.to_text(motion) == motion_text.to_text(nod())
     path.unlink()
     assert str(setup) == 'tick, mimic, {"motion": "nod"}'
     again = Setup.from_dict(setup.to_dict())
