@@ -60,8 +60,9 @@ class VecEnv(vec_env.VecEnv):
         """
         if any(self._options):
             raise ValueError(f"options of reset: expected none, got {checks.quote(self._options)}")
-        observations, _ = self.environments.reset(seed=self._seeds)
+        observations, info = self.environments.reset(seed=self._seeds)
         self.reset_infos = [{} for _ in range(self.num_envs)]
+        _distribute(info, self.reset_infos)
         self._reset_seeds()
         self._reset_options()
         return observations
@@ -79,14 +80,17 @@ class VecEnv(vec_env.VecEnv):
             `TimeLimit.truncated`, and with `terminal_observation` if its episode ended.
         """
         observations, rewards, terminated, truncated, info = self.environments.step(self._actions)
-        infos = [{"TimeLimit.truncated": is_cut_off} for is_cut_off in (truncated & ~terminated).tolist()]
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         last_observations = info.pop("final_obs", None)
         info_of_ends = info.pop("final_info", {})
         _distribute(info, infos)
-        _distribute(info_of_ends, infos)
         has_ended = terminated | truncated
         for index in np.flatnonzero(has_ended):
-            infos[index]["terminal_observation"] = last_observations[index]
+            self.reset_infos[index] = infos[index]  # of the episode that begins
+            infos[index] = {"terminal_observation": last_observations[index]}
+        _distribute(info_of_ends, infos)
+        for index, is_cut_off in enumerate((truncated & ~terminated).tolist()):
+            infos[index]["TimeLimit.truncated"] = is_cut_off
         return observations, rewards.astype(np.float32), has_ended, infos
 
     def close(self) -> None:

@@ -58,6 +58,23 @@ def test_environments_are_stable_baselines_own(both):
     assert envs.has_attr("task") and not envs.has_attr("nothing")
 
 
+def test_infos_of_starts_have_privileged_observations():
+    settings = {"task_kwargs": {"time_limit": 0.5, "on_divergence": "truncate"}, "privileged": True}
+    envs = sb3.VecEnv(gymnasium.make_vec(ID, num_envs=2, autoreset_mode="SameStep", **settings))
+    dummy = vec_env.DummyVecEnv([lambda: gymnasium.make(ID, **settings)] * 2)
+    for both_envs in (envs, dummy):
+        both_envs.seed(5)
+        both_envs.reset()
+    actions = np.zeros((2, 18), np.float32)
+    for _ in range(12):
+        assert data_equivalence(envs.reset_infos, dummy.reset_infos, exact=True)
+        assert all(info["privileged"].any() for info in envs.reset_infos)
+        infos, expected_infos = envs.step(actions)[3], dummy.step(actions)[3]
+        assert [info.keys() for info in infos] == [info.keys() for info in expected_infos]
+    envs.close()
+    dummy.close()
+
+
 def test_agents_save_what_they_were_trained_for(both):
     """The space is that of single environments, with an attribute."""
     envs, dummy = both
