@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 import mujoco
+import numpy as np
 
 from arc_suite import parsers
 from arc_suite.importing import bounds, inertias, kinds, mesh_colors, missing_masses, references, units, urdf
@@ -270,8 +271,24 @@ def _free_torso(spec: mujoco.MjSpec, model: mujoco.MjModel) -> tuple[mujoco.MjMo
         raise SpecError(f"the torso {name!r} moves by the joint {joint.name!r} alone; expected a free or a fixed torso")
     body_of_spec = spec.body(name) if name else spec.bodies[torso]
     body_of_spec.add_freejoint()
+    _insert_torso_pose(spec, model, torso)
     note = f"the torso {name} is fixed to the world in the file: it has a free joint now"
     return _with_short_errors(spec.compile), torso, (note,)
+
+
+def _insert_torso_pose(spec: mujoco.MjSpec, model: mujoco.MjModel, torso: int) -> None:
+    """Give the keyframes of a spec the pose of a torso that is free now; they would move by seven numbers without it.
+
+    Args:
+        spec: spec of the file, which is changed.
+        model: compiled from it while the torso was fixed.
+        torso: body of the torso.
+    """
+    pose = (*model.body_pos[torso], *model.body_quat[torso])
+    later_joints = np.flatnonzero(model.jnt_bodyid > torso)
+    index = model.jnt_qposadr[later_joints[0]]
+    for key, qpos in zip(spec.keys, model.key_qpos, strict=True):
+        key.qpos = np.insert(qpos, index, pose)
 
 
 def _count_joints_below(model: mujoco.MjModel, body: int) -> int:

@@ -2,6 +2,7 @@
 
 import importlib.util
 import pathlib
+import re
 import struct
 import sys
 
@@ -55,6 +56,7 @@ LEG = """
   </body>
 </body>"""
 PLACES = {"FL": (0.2, 0.1), "FR": (0.2, -0.1), "HL": (-0.2, 0.1), "HR": (-0.2, -0.1)}
+DOOR = '<body name="door" pos="3 0 1"><joint name="door" axis="0 0 1"/><geom type="box" size="0.4 0.02 1"/></body>'
 
 
 def reference():
@@ -311,6 +313,18 @@ def test_a_urdf_whose_y_axis_points_up_is_turned(tmp_path):
     assert "turned: the file's y axis points up, the torso's frame has z there" in notes
     assert body.torso.standing_height == pytest.approx(import_robot(A1).body.torso.standing_height, rel=0.02)
     assert reference().same_bits(path, body) == 200
+
+
+@pytest.mark.parametrize(("door", "angle"), [("", ""), (DOOR, "0.5 ")], ids=["alone", "beside a door"])
+def test_keyframes_of_a_fixed_torso_are_standing_poses(door, angle, tmp_path):
+    text = GO2.read_text().replace("<freejoint/>", "").replace("<worldbody>", f"<worldbody>{door}")
+    text = re.sub(r'qpos="\S+ \S+ \S+ 1 0 0 0 ', f'qpos="{angle}', text)
+    path = tmp_path / "fixed.xml"
+    path.write_text(text.replace("<keyframe>", '<keyframe><key name="zero"/>'))
+    for home in (None, "home"):
+        body, notes = import_robot(path, home=home)
+        assert "standing pose: keyframe home, torso 0.288 m above the floor" in notes
+        assert list(model(body).key_qpos[0]) == list(model(import_robot(GO2).body).key_qpos[0])
 
 
 @pytest.mark.parametrize(
