@@ -211,7 +211,8 @@ class Environment(KnownAttributes, control.Environment):
         self.physics.check_process()
         if self.task.memory is None:
             raise RuntimeError("cannot take a snapshot: no episode has begun; call reset first")
-        return snapshots.to_arrays(self._state(), [self.task.opened])
+        simulations = self.physics.snapshot(self.task.definition.reads)
+        return snapshots.to_arrays(self._state(simulations), [self.task.opened])
 
     @one_thread_at_a_time
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
@@ -226,7 +227,7 @@ class Environment(KnownAttributes, control.Environment):
         begun = self._begun()
         check_simulations = functools.partial(self.physics.check_snapshot, fields=run.definition.reads)
         state, (present_tasks, next_tasks) = snapshots.from_arrays(
-            begun._state(), begun.task.definition, check_simulations, arrays, [run.opened], self.task_kwargs
+            begun._state({}), begun.task.definition, check_simulations, arrays, [run.opened], self.task_kwargs
         )
         usage.check_seeds(state.environment_arrays["stream_seeds"].tolist())
         self.physics.restore(state.simulations)
@@ -248,9 +249,8 @@ class Environment(KnownAttributes, control.Environment):
         if self.task.memory is not None:  # copies of a simulation know nothing of a task
             self.task.add_to_pictures(self.physics)
 
-    def _state(self) -> snapshots.State:
-        """Return the state, with a leading axis as that of a `VectorEnv` of one environment."""
-        simulations = self.physics.snapshot(self.task.definition.reads)
+    def _state(self, simulations: Mapping[str, np.ndarray]) -> snapshots.State:
+        """Return the state with these arrays of the simulation, as that of a `VectorEnv` of one environment."""
         return self.task.state(simulations, self.physics, self._step_count, self._reset_next_step)
 
     @one_thread_at_a_time

@@ -74,7 +74,7 @@ class State(NamedTuple):
 
 def check_generator(random: np.random.RandomState) -> None:
     """Raise ValueError for a generator whose state no snapshot holds, such as PCG64 of `default_rng`."""
-    generator = random.get_state(legacy=False)["bit_generator"]
+    generator = type(random._bit_generator).__name__
     if generator != _GENERATOR:
         raise ValueError(
             f"random: snapshots hold states of {_GENERATOR} alone, got {generator}; "

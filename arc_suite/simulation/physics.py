@@ -19,7 +19,7 @@ from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import forks, pictures, timers
 from arc_suite.simulation.annotations import Data, Model, Named
-from arc_suite.simulation.model import change_fields, compile_model, field, merge_lasting, shared_model
+from arc_suite.simulation.model import FIELDS, change_fields, compile_model, field, merge_lasting, shared_model
 from arc_suite.simulation.state_arrays import LASTING_PREFIX, MODEL_PREFIX, check_snapshot, model_fields
 
 if TYPE_CHECKING:
@@ -144,11 +144,13 @@ class Physics(dm_mujoco.Physics):
 
     def _keep_edits(self, names: Iterable[str]) -> None:
         """Make those rows of fields lasting that a user has written into the model."""
+        model = self.model.ptr
+        compiled_model = shared_model(self.body, self.arena)
         for name in names:
-            present_values = field(self.model.ptr, name)
+            present_values = field(model, name)
             known_values = self._written.get(name)
             if known_values is None:
-                known_values = self.compiled_field(name)
+                known_values = field(compiled_model, name)
             differs = present_values != known_values
             if differs.any():
                 is_edited = differs.reshape(len(differs), -1).any(axis=1)
@@ -299,26 +301,36 @@ class Physics(dm_mujoco.Physics):
         return physics
 
     def snapshot(self, fields: Iterable[str]) -> dict[str, np.ndarray]:
-        """Return the simulation's state and derived fields of `MjData` as a snapshot of a `Batch` of one."""
-        self._keep_edits(self._written)
+        """Return the simulation's state and derived fields of `MjData` as a snapshot of a `Batch` of one.
+
+        It has the fields of the model that differ from the compiled ones. MuJoCo's constants that follow from a user's
+        edits are updated, as they are where the snapshot is restored.
+        """
+        earlier_lasting = self._lasting
+        self._keep_edits(FIELDS)
+        if self._lasting is not earlier_lasting:
+            change_fields(self.model.ptr, {}, self._get_scratch())
+        models = {f"{MODEL_PREFIX}{name}": field(self.model.ptr, name)[None].copy() for name in self._written}
+        lasting = {f"{LASTING_PREFIX}{name}": np.array(values)[None] for name, values in self._lasting.items()}
+        return self._state_arrays(fields) | models | lasting
+
+    def _state_arrays(self, fields: Iterable[str]) -> dict[str, np.ndarray]:
+        """Return the arrays of a snapshot that do not depend on changes of the model."""
         model = self.model.ptr
         data = self.data.ptr
         state = np.empty((1, mujoco.mj_stateSize(model, _STATE)))
         mujoco.mj_getState(model, data, state[0], _STATE)
-        fields = dict.fromkeys(("qpos", "qvel", "ctrl", *fields))
-        models = {f"{MODEL_PREFIX}{name}": field(model, name)[None].copy() for name in self._written}
-        lasting = {f"{LASTING_PREFIX}{name}": np.array(values)[None] for name, values in self._lasting.items()}
-        return {"state": state, **{name: getattr(data, name)[None].copy() for name in fields}, **models, **lasting}
+        names = dict.fromkeys(("qpos", "qvel", "ctrl", *fields))
+        return {"state": state, **{name: getattr(data, name)[None].copy() for name in names}}
 
     def check_snapshot(self, arrays: Mapping[str, np.ndarray], fields: Iterable[str]) -> Mapping[str, np.ndarray]:
         """Return the arrays of a snapshot if `restore` can take them; see `Batch.check_snapshot`."""
-        present = self.snapshot(fields)
-        like = {name: array for name, array in present.items() if not name.startswith((MODEL_PREFIX, LASTING_PREFIX))}
-        return check_snapshot(like, [self.model.ptr], arrays)
+        return check_snapshot(self._state_arrays(fields), [self.model.ptr], arrays)
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Continue bit-identically from the arrays of `snapshot`."""
+        """Continue bit-identically from the arrays of `snapshot`, without later edits of the model."""
         self.check_process()
+        self._keep_edits(FIELDS)
         fields_of_batch, lasting_of_batch = model_fields(arrays)
         fields = {name: values[0] for name, values in fields_of_batch.items()}
         self._restore_compiled_fields()

@@ -308,3 +308,36 @@ def test_restore_forgets_the_terms_and_the_glow_of_the_abandoned_future():
     batch.step(np.zeros((2, 18)))
     batch.restore(arrays)
     assert batch.task.terms == {}
+
+
+@pytest.mark.parametrize("kind", ["single", "vector"])
+def test_a_snapshot_has_the_users_edits_of_the_model(kind):
+    """They may be written at once, or by `change_model`, and before or after another change of the same field."""
+    environment = arc_suite.load("queen", "walk", {"random": 0}, {"flat_observation": True})
+    environment.reset()
+    arrays_before = environment.snapshot()
+    environment.physics.model.body_mass[1] *= 3.0
+    environment.physics.model.opt.gravity[2] *= 0.5
+    arrays = environment.snapshot()
+    assert {"batch/model_body_mass", "batch/lasting_body_mass", "batch/model_gravity"} <= arrays.keys()
+    actions = np.random.default_rng(0).uniform(-1.0, 1.0, (30, 18))
+    if kind == "single":
+        other = arc_suite.load("queen", "walk", {"random": 1}, {"flat_observation": True})
+    else:
+        other = VectorEnv("queen", "walk", 1)
+    other.restore(arrays)
+    for action in actions:
+        expected = environment.step(action)
+        if kind == "single":
+            assert other.step(action).reward == expected.reward
+        else:
+            assert other.step(action[None])[1] == expected.reward
+    if kind == "single":  # back to before the edits, and the edits stay over resets
+        mass = other.reset() and other.physics.model.body_mass[1]
+        twin = arc_suite.load("queen", "walk", {"random": 0}, {"flat_observation": True})
+        twin.reset()
+        assert mass == 3.0 * twin.physics.model.body_mass[1]
+        other.restore(arrays_before)
+        assert other.physics.model.body_mass[1] == twin.physics.model.body_mass[1]
+        for action in actions:
+            assert other.step(action).reward == twin.step(action).reward
