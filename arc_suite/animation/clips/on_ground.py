@@ -12,6 +12,7 @@ from arc_suite.animation.clips.bones import pose_parts
 from arc_suite.animation.clips.meshes import body_meshes
 from arc_suite.animation.clips.root_motion import ClipMotion, Pose, fade_out
 from arc_suite.animation.parts import Part, describe_body, part_frames
+from arc_suite.models import visuals
 from arc_suite.models.standing import time_unit
 from arc_suite.motions.runs import find_runs
 from arc_suite.robots.spec import Body
@@ -43,7 +44,7 @@ def measure_ground(body: Body, motion: ClipMotion) -> Ground:
 
     The end of a leg next to its foot is a part of the foot.
     """
-    parts, points_of_parts = _drawn_points(body)
+    parts, points_of_parts = _drawn_points(body, visuals.looks_of(body))
     radius_of_foot = {name: leg.foot.radius for name, leg in zip(body.foot_names, body.legs, strict=True)}
     poses = Pose(motion.positions, motion.quaternions, motion.joints)
     positions, orientations = part_frames(pose_parts(parts, poses))
@@ -110,8 +111,13 @@ def raise_out_of_ground(body: Body, motion: ClipMotion, fixed_ends: Sequence[int
 
 
 @functools.lru_cache(maxsize=8)
-def _drawn_points(body: Body) -> tuple[Sequence[Part], list[np.ndarray]]:
-    """Return the parts of a body, and the points (n, 3) of their meshes in their frames, m; without ends at feet."""
+def _drawn_points(body: Body, looks: str) -> tuple[Sequence[Part], list[np.ndarray]]:
+    """Return the parts of a body, and the points (n, 3) of their meshes in their frames, m; without ends at feet.
+
+    Args:
+        body: any body.
+        looks: of `visuals.looks_of`, as a key of the cache.
+    """
     parts, _ = describe_body(body)
     points_of_parts = []
     for meshes in body_meshes(parts, body.torso.standing_height):

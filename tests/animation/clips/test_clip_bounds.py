@@ -10,7 +10,16 @@ from tiers import tiers
 
 from arc_suite import models
 from arc_suite.animation import clips as export
-from arc_suite.animation.clips import acting, bounds, from_rest, gestures, on_ground, standing_legs, turning
+from arc_suite.animation.clips import (
+    acting,
+    bounds,
+    from_rest,
+    gestures,
+    hard_ground,
+    on_ground,
+    standing_legs,
+    turning,
+)
 from arc_suite.animation.clips.catalog import BOTH_ENDS, CLIPS, Acted, Turn
 from arc_suite.animation.clips.root_motion import Pose
 from arc_suite.bodies.families import sound_body
@@ -18,7 +27,10 @@ from arc_suite.cpg import leaps
 from arc_suite.envs.setup import Setup
 from arc_suite.models.posture import find_rest_pose
 from arc_suite.models.standing import standing_qpos
+from arc_suite.models.visuals import VISUALS
+from arc_suite.models.visuals.spec import Ornament, Visuals
 from arc_suite.robots import ROBOTS
+from arc_suite.robots.spec import MATERIALS
 
 TICK, QUEEN, BASTION, LEAPER = (ROBOTS[name] for name in ("tick", "queen", "bastion", "leaper"))
 STANDS = Acted(gestures.idle, BOTH_ENDS)
@@ -137,6 +149,21 @@ def test_gestures_of_any_body_keep_to_the_bounds(seed):
         assert "the legs" in str(error)
     else:
         assert bounds.find_excess(body, CLIPS[name], motion) == ""
+
+
+def test_the_ground_is_measured_for_the_visuals_that_were_registered_last(monkeypatch):
+    """A ball that hangs deep below the torso is what is lowest, and touches hard ground."""
+    body = TICK.replace(name="painted")
+    depths = []
+    heights = []
+    for place in (0.0, -1.5 * body.torso.standing_height):
+        ball = Ornament("ball", "shell", "sphere", (0.01,), (0.0, 0.0, place))
+        monkeypatch.setitem(VISUALS, body.name, Visuals(dict.fromkeys(MATERIALS, (1.0, 0.0, 0.0)), ornaments=(ball,)))
+        depths.append(on_ground.measure_ground(body, still(body)).lowest_part.min())
+        model = hard_ground.compile_on_hard_ground(body)
+        heights.append(model.geom("visual-ball").pos[2])
+    assert depths[0] > -0.01 > depths[1] + 0.3 * body.torso.standing_height
+    assert heights == pytest.approx([0.0, -1.5 * body.torso.standing_height])
 
 
 @pytest.mark.slow
