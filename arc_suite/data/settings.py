@@ -9,6 +9,7 @@ from arc_suite import policies, registry, seed_ranges
 from arc_suite.cpg.selection import presets_of, suited_preset
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
+from arc_suite.evaluation import provenance
 from arc_suite.policies import checkpoints
 from arc_suite.tasks.contract import STEPS
 
@@ -78,8 +79,10 @@ class DatasetSettings(NamedTuple):
         record = self.setup.provenance() | self._asdict() | {"presets": list(names)}
         del record["setup"]
         record["presets_sha256"] = [_sha256(repr(presets.get(registry.bare_name(preset)))) for preset in names]
+        policy_sha256 = provenance.policy_sha256(self.policy)
+        if policy_sha256 is not None:
+            record["policy_sha256"] = policy_sha256
         if policies.is_file(self.policy):
-            record["policy_sha256"] = policies.digest(self.policy)
             record["agents"] = [agent._asdict() for agent in checkpoints.agents(Path(self.policy))]
         return record
 

@@ -1,6 +1,7 @@
 """Datasets: Minari opens them, they replay bit-exactly, and they depend on nothing but seeds and settings."""
 
 import dataclasses
+import shutil
 import sys
 
 import gaitless
@@ -9,7 +10,7 @@ import interpreters
 import minari
 import numpy as np
 import pytest
-from datasets import ID, QUEEN, SETTINGS, SHORT, SPIDER, TICK, collect, digests, quiet, verify
+from datasets import ID, QUEEN, SETTINGS, SHORT, SPIDER, TICK, collect, digests, edited, quiet, verify
 from refusals import refused
 from tiers import never, tiers
 
@@ -17,6 +18,8 @@ from arc_suite import data
 from arc_suite.bodies import generator
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import provenance
+from arc_suite.policies.network import PACKAGED
 
 OWN = """
 import numpy as np
@@ -237,6 +240,37 @@ def test_numbers_of_a_preset_that_changed_under_its_name_are_noticed(monkeypatch
     monkeypatch.setitem(PRESETS["queen"], "medium", medium)
     monkeypatch.setitem(PRESETS["queen"], "fast", changed)  # which is none of the dataset's
     assert collect(ID, settings, 3) == 1
+
+
+@pytest.mark.parametrize("kind", ["a policy file", "a function"])
+def test_another_policy_under_the_name_of_the_first_is_refused(tmp_path, kind):
+    file = tmp_path / "mine.npz"
+    name = str(file)
+    contents = [PACKAGED / "tick-walk.npz", PACKAGED / "tick-steer.npz"]
+    if kind == "a function":
+        file = tmp_path / "mine.py"
+        name = f"{file}:make"
+        contents = [tmp_path / "still.py", tmp_path / "lifted.py"]
+        for path, action in zip(contents, (0.0, 1.0), strict=True):
+            path.write_text(f"import numpy as np\ndef make(robot): return lambda timestep: np.full(18, {action})\n")
+    settings = data.DatasetSettings(TICK, name, **SHORT)
+    shutil.copy(contents[0], file)
+    assert collect(ID, settings, 1) == 1
+    assert collect(ID, settings, 2) == 1
+    first_sha256 = data.open(ID).metadata["arc_suite"]["policy_sha256"]
+    shutil.copy(contents[1], file)
+    second_sha256 = provenance.policy_sha256(name)
+    difference = f"its policy_sha256 is '{first_sha256}', and not '{second_sha256}'"
+    with refused(f"dataset {ID!r} is another: {difference}", begins=True):
+        collect(ID, settings, 3)
+    assert len(data.open(ID)) == 2
+
+
+def test_a_dataset_from_before_hashes_of_policy_files_goes_on(root):
+    settings = data.DatasetSettings(TICK, str(PACKAGED / "tick-walk.npz"), **SHORT)
+    collect(ID, settings, 1)
+    edited(root, lambda metadata: metadata["arc_suite"].pop("policy_sha256"))
+    assert collect(ID, settings, 2) == 1
 
 
 @pytest.mark.parametrize(
