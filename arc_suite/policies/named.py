@@ -66,7 +66,7 @@ def _ppo(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -
         choices = checks.list_choices(sorted(file.stem for file in PACKAGED.glob(f"*{network.EXTENSION}")))
         hint = "arc-suite train makes others, and universal moves any body"
         raise ValueError(f"policy ppo: none for {path.stem} {choices}; {hint}")
-    return _from_network(path, body, task)
+    return _fit_network(f"policy {path}", network.load(path), body, task)
 
 
 def _universal(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
@@ -146,11 +146,12 @@ def policy(
     if isinstance(source, PolicyFile):
         named_policy = _from_other_library(source, body, task)
     elif isinstance(source, NetworkPath):
-        checkpoints = network.checkpoint_files(source.path)
-        if checkpoints:
-            named_policy = Mixture([_from_network(path, body, task) for path in checkpoints], num_envs)
+        networks = {path: network.load(path) for path in network.checkpoint_files(source.path)}
+        if networks:
+            checkpoints = [_fit_network(f"policy {path}", networks[path], body, task) for path in networks]
+            named_policy = Mixture(checkpoints, num_envs)
         else:
-            named_policy = _from_network(source.path, body, task)
+            named_policy = _fit_network(f"policy {source.path}", network.load(source.path), body, task)
     elif isinstance(source, FunctionName):
         named_policy = _from_function(source, body, num_envs)
     else:
@@ -177,18 +178,20 @@ def acting(source, task: Task, presets: str | Sequence[str] | None = None) -> Po
     """Return a policy for one environment.
 
     Args:
-        source: a name or a path, as of `policy`; a policy for one environment; or a function of a `TimeStep` with
-            named blocks.
+        source: a name or a path, as of `policy`; a `Network`; another policy for one environment; or a function of
+            a `TimeStep` with named blocks.
         task: the task in which it acts.
         presets: presets of the demonstrator, see `policy`.
 
     Raises:
-        ValueError: something else, or as `policy`.
+        ValueError: something else, a network of another body or of other actions, or as `policy`.
         OSError: as `policy`.
     """
     body = task.scene.body
     if isinstance(source, str | os.PathLike):
         return policy(os.fspath(source), body, presets, task=task)
+    if isinstance(source, Network):
+        return _fit_network("policy", source, body, task)
     if hasattr(source, "act"):
         return source
     if callable(source):
@@ -402,54 +405,64 @@ def _find_source(name: str | os.PathLike[str]) -> PolicyFile | NetworkPath | Fun
     return None
 
 
-def _from_network(path: Path, body: Body, task: Task | None) -> Policy:
-    policy_network = network.load(path)
+def _fit_network(label: str, policy_network: Network, body: Body, task: Task | None) -> Policy:
+    """Return the policy of a network for a body and a task; one of many bodies acts in the order of the body's legs.
+
+    Args:
+        label: beginning of errors and warnings.
+        policy_network: network of one body, or of many.
+        body: body that acts.
+        task: task in which it acts, None for walk.
+
+    Raises:
+        ValueError: a network of another body, or of other actions.
+    """
     if policy_network.setup.several:
         if task is None:
             task, _ = prepare_task(body, "walk")
         return registry.resolve(_UNIVERSAL_MODULE).Universal(policy_network, task)
-    _check_setup(path, policy_network.setup, body, task)
-    _check_joints(path, policy_network.joints, body)
-    _warn_of_other_model(path, policy_network)
+    _check_setup(label, policy_network.setup, body, task)
+    _check_joints(label, policy_network.joints, body)
+    _warn_of_other_model(label, policy_network)
     return policy_network
 
 
 def _from_other_library(policy_file: PolicyFile, body: Body, task: Task | None) -> Policy:
-    path = policy_file.path
+    label = f"policy {policy_file.path}"
     setup = policy_file.setup()
     if setup is None:
-        warnings.warn(f"policy {path}: {policy_file.reader.NO_SETUP}", stacklevel=_STACK_LEVEL - 1)
+        warnings.warn(f"{label}: {policy_file.reader.NO_SETUP}", stacklevel=_STACK_LEVEL - 1)
     else:
-        _check_setup(path, setup, body, task)
+        _check_setup(label, setup, body, task)
     loaded = policy_file.load()
-    _check_joints(path, loaded.joints, body)
+    _check_joints(label, loaded.joints, body)
     return loaded
 
 
-def _check_setup(path: Path, setup: Setup, body: Body, task: Task | None) -> None:
+def _check_setup(label: str, setup: Setup, body: Body, task: Task | None) -> None:
     """Raise ValueError if a policy was trained for another body, or for other actions."""
     is_robot_of_name = is_robot(setup.body) and setup.body.name == body.name
     if not setup.body.moves_like(body):
         if not is_robot_of_name:
             name = "another body of that name" if setup.body.name == body.name else setup.body.name
-            raise ValueError(f"policy {path}: made for {name}, and not for {body.name}")
-        warnings.warn(f"policy {path}: learned with another {body.name} than this one", stacklevel=_STACK_LEVEL)
+            raise ValueError(f"{label}: made for {name}, and not for {body.name}")
+        warnings.warn(f"{label}: learned with another {body.name} than this one", stacklevel=_STACK_LEVEL)
     actions = setup.definition.actions
     if task is not None and actions != task.actions:
-        raise ValueError(f"policy {path}: its actions are a {actions} a joint, and {task.name} takes a {task.actions}")
+        raise ValueError(f"{label}: its actions are a {actions} a joint, and {task.name} takes a {task.actions}")
 
 
-def _warn_of_other_model(path: Path, policy_network: Network) -> None:
+def _warn_of_other_model(label: str, policy_network: Network) -> None:
     """Warn if the model of a policy's training has changed since, with its robot, its task or the suite."""
     setup = policy_network.setup
     if policy_network.physics_sha256 not in (None, setup.physics_sha256):
-        text = f"policy {path}: the model of {setup.name}, {setup.task_label} has changed since its training"
+        text = f"{label}: the model of {setup.name}, {setup.task_label} has changed since its training"
         warnings.warn(text, stacklevel=_STACK_LEVEL)
 
 
-def _check_joints(path: Path, joints: int, body: Body) -> None:
+def _check_joints(label: str, joints: int, body: Body) -> None:
     if joints != len(body.joint_names):
-        raise ValueError(f"policy {path}: moves {joints} joints, and {body.name} has {len(body.joint_names)}")
+        raise ValueError(f"{label}: moves {joints} joints, and {body.name} has {len(body.joint_names)}")
 
 
 def _from_function(function: FunctionName, body: Body, num_envs: int) -> Policy:

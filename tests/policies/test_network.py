@@ -327,3 +327,28 @@ def test_a_policy_of_torques_is_refused_where_positions_are_taken(saved):
     assert policies.policy(str(saved), "tick", task=arc_suite.load("tick", "walk").task.definition) is not None
     network.save(saved / "policy.npz", made()._replace(setup=Setup.of("tick", "walk", {"actions": "position"})))
     assert policies.policy(str(saved), "tick", task=task) is not None
+
+
+@pytest.mark.parametrize(
+    ("robot", "settings", "line"),
+    [
+        ("queen", {}, "made for tick, and not for queen"),
+        ("tick", {"actions": "position"}, "its actions are a torque a joint, and walk takes a position"),
+    ],
+)
+def test_a_network_is_refused_where_its_file_is(saved, robot, settings, line):
+    kwargs = {"task_kwargs": settings | {"time_limit": 0.5}, "episodes": 1}
+    with refused(f"policy {saved}: {line}"):
+        evaluation.evaluate(str(saved), robot, **kwargs)
+    for policy in (made(), policies.load_network(str(saved))):
+        with refused(f"policy: {line}"):
+            evaluation.evaluate(policy, robot, **kwargs)
+
+
+def test_a_network_of_one_body_and_of_many_acts_as_its_file(saved):
+    settings = {"time_limit": 0.5}
+    for policy in (made(), of_many_bodies()):
+        network.save(saved / "policy.npz", policy)
+        of_file = evaluation.evaluate(str(saved), "tick", task_kwargs=settings, episodes=1)
+        of_object = evaluation.evaluate(policy, "tick", task_kwargs=settings, episodes=1)
+        assert of_object.returns.mean == of_file.returns.mean
