@@ -19,6 +19,13 @@ _PACKAGE = __name__.partition(".")[0]
 _NUM_ENVS = 3  # of the batch in which kinds and shapes are checked
 _NUM_FINITE_ENVS = 16  # that random actions move
 _READ_ONLY = "read-only"  # in NumPy's error of a write into a frozen array
+# What reports and tables say of every episode or policy; a metric of the same name would take its place.
+_TAKEN_NAMES = (
+    *("provenance", "preset", "zero_return", "paper_return", "return", "score", "no_score", "anchors"),
+    *("length", "episodes", "run", "step", "policy_sha256", "seed", "wall_seconds", "cpu_seconds"),
+)
+_TAKEN_PREFIX = "style_"  # of the metrics of style
+_SEPARATORS = frozenset(',"\r\n')  # of the cells of a table
 
 
 def check_results(setup: Setup) -> None:
@@ -132,8 +139,10 @@ def _check_step(task: Task, memory, readings: Readings, action: np.ndarray, shap
     _check_memory(task, "before", memory_with_action, memory)
     next_memory = _call(task, "after", memory_with_action, readings)
     _check_memory(task, "after", next_memory, memory)
-    for method, arguments in (("terms", (next_memory, readings)), ("progress", (next_memory,))):
-        _check_numbers(task, method, _call(task, method, *arguments), shape)
+    _check_numbers(task, "terms", _call(task, "terms", next_memory, readings), shape)
+    metrics = _call(task, "progress", next_memory)
+    _check_numbers(task, "progress", metrics, shape)
+    _check_metric_names(task, metrics)
     blocks = _call(task, "observe", next_memory, readings)
     if not isinstance(blocks, Mapping):
         _refuse(task, "observe", "a dictionary of blocks by name", blocks)
@@ -166,6 +175,16 @@ def _check_numbers(task: Task, method: str, numbers: Any, shape: tuple[int, ...]
             _refuse(task, method, f"a number for each environment as {name!r}", value)
         if np.shape(value) not in ((), shape):
             _refuse(task, method, f"{name!r} of shape {shape}", f"shape {np.shape(value)}")
+
+
+def _check_metric_names(task: Task, metrics: Mapping) -> None:
+    """Raise ValueError for a metric whose name reports or tables cannot hold, or have for another value."""
+    for name in metrics:
+        if not isinstance(name, str) or _SEPARATORS & set(name):
+            _refuse(task, "progress", "a text without commas, quotes and line breaks as name of a metric", name)
+        if name in _TAKEN_NAMES or name.startswith(_TAKEN_PREFIX):
+            expected = f"another name of a metric, such as 'task_{name}', as tables have their own {name!r}"
+            _refuse(task, "progress", expected, name)
 
 
 def _check_ends(task: Task, ends: Any, shape: tuple[int, ...]) -> None:

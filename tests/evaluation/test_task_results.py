@@ -8,6 +8,8 @@ import pytest
 from arc_suite import evaluation, policies
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import task_results
+from arc_suite.learning import finals
+from arc_suite.learning.studies import results
 from arc_suite.tasks import TASKS
 from arc_suite.tasks.walk import Walk
 
@@ -106,6 +108,14 @@ ENDS = "expected a pair of booleans, whether the episode is terminated and wheth
             "Carry.progress: expected 'action' of shape (), got shape (18,)",
         ),
         (
+            {"progress": lambda self, memory: {"a,b": 1.0}},
+            "Carry.progress: expected a text without commas, quotes and line breaks as name of a metric, got 'a,b'",
+        ),
+        (
+            {"progress": lambda self, memory: {7: 1.0}},
+            "Carry.progress: expected a text without commas, quotes and line breaks as name of a metric, got 7",
+        ),
+        (
             {"observe": lambda self, *args: Walk.observe(self, *args) | {"posture": [1.0]}},
             "Carry.observe: expected an array as block 'posture', got [1.0]",
         ),
@@ -129,6 +139,29 @@ ENDS = "expected a pair of booleans, whether the episode is terminated and wheth
 def test_a_result_that_does_not_fit_is_told(setup_of, attributes, message):
     with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
         task_results.check_results(setup_of(**attributes))
+
+
+TAKEN_NAMES = (
+    *("provenance", "preset", "zero_return", "paper_return", "return", "score", "no_score", "anchors", "length"),
+    *("episodes", "run", "step", "policy_sha256", "seed", "wall_seconds", "cpu_seconds", "style_weight"),
+)
+
+
+@pytest.mark.parametrize("name", TAKEN_NAMES)
+def test_a_metric_does_not_take_the_place_of_a_result(setup_of, name):
+    setup = setup_of(progress=lambda self, memory: Walk.progress(self, memory) | {name: 7.0})
+    message = (
+        f"Carry.progress: expected another name of a metric, such as 'task_{name}', as tables have their own "
+        f"'{name}', got '{name}'"
+    )
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
+        evaluation.evaluate("zero", setup.robot, setup.task, task_kwargs=setup.task_kwargs, episodes=1)
+
+
+def test_a_report_and_the_tables_have_no_name_that_a_metric_may_have(setup_of):
+    report = evaluation.evaluate("zero", "tick", "walk", task_kwargs={"time_limit": 1.0}, episodes=1)
+    columns = {*report.to_json(), *finals.COLUMNS, *results.TIMES, "step", "run"}
+    assert columns - set(report.progress) <= set(TAKEN_NAMES)
 
 
 def test_errors_of_the_methods_themselves_pass_through(setup_of):
