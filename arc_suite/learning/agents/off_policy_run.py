@@ -250,7 +250,7 @@ def _open_buffer(hp: SoftActorCritic, context: RunContext, size: int, joints: in
         capacity=min(hp.buffer_size, control_steps * hp.num_envs),
         size=size,
         joints=joints,
-        slack=STEPS_PER_SLICE,
+        slack=-(-STEPS_PER_SLICE // hp.num_envs) * hp.num_envs,  # what all environments add between two checkpoints
         mode="w+" if context.checkpoint is None else "r+",
         num_envs=hp.num_envs,
     )

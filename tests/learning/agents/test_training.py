@@ -107,6 +107,24 @@ def test_tiny_run(name, tiny, tmp_path, monkeypatch):
     assert [key for key in whole if whole[key] != resumed[key]] == []
 
 
+def test_a_run_goes_on_after_its_buffer_has_overwritten_what_it_holds(tmp_path):
+    """It ends after the last step before a checkpoint, which many environments reach late."""
+    changes = {"num_envs": 600, "utd_ratio": 1 / 600, "buffer_size": 600, "start_steps": 0}
+    run = Configuration.of(
+        Setup.of("tick", "walk", SHORT), "sac", small("sac", **changes), steps=3000, evaluate_every=3000
+    )
+    assert train(run, tmp_path / "whole", progress=silent)
+
+    def stop(step, metrics):
+        if step == 2400:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(run, tmp_path / "broken", progress=silent, on_metrics=stop)
+    assert train(run, tmp_path / "broken", progress=silent)
+    assert contents(tmp_path / "broken") == contents(tmp_path / "whole")
+
+
 def test_progress_shows_the_latest_evaluation_and_training_since():
     metrics = {"reward": 1.43418, "falls": 42.0, "std": 0.37}
     assert training._postfix(metrics, {}) == "reward 1.434 a step, falls 42"
