@@ -65,6 +65,11 @@ SIZES = {"rise": (0.0, 100.0), "slope": (0.0, 1.2), "width": (1e-9, 1000.0)}
 _MIN_WIDTH = 0.125  # of a tread or trench: every step is a box, and boxes take time
 
 
+def min_width(body: Body) -> float:
+    """Return the least width of a tread or trench for a body, m."""
+    return _MIN_WIDTH * body.torso.standing_height
+
+
 def sizes(kinds: Sequence[str]) -> tuple[str, ...]:
     """Return the names of sizes that a caller may set for lanes of these kinds: none if two kinds share a size."""
     names = tuple(name for kind in kinds for name in _DIFFICULTIES[kind](0.0))
@@ -329,7 +334,7 @@ def make_lanes(
     for name, size in (sizes_in_meters or {}).items():
         fixed_sizes[name] = math.tan(size) if name == "slope" else size / unit
     if "width" in fixed_sizes:
-        checks.number("width", sizes_in_meters["width"], _MIN_WIDTH * unit)
+        checks.number("width", sizes_in_meters["width"], min_width(body))
     lanes = []
     for kind in sorted(kinds, key=KINDS.index):
         for level in levels:

@@ -144,6 +144,7 @@ class Noise(NamedTuple):
 # Settings that every task with a gait has.
 NAMES = (*Parameters._fields, *SHARED_NOISE, *Noise._fields, "weights", "gait")
 
+POSITIVE = (1e-9, LARGEST)  # lowest and highest number above 0
 MIN_SPEED = 0.001  # m/s, of a target velocity, as paths and speeds are divided by it
 
 BOUNDS = {
@@ -248,7 +249,7 @@ def positive(name: str, value: Any) -> float:
     Raises:
         ValueError: it is not.
     """
-    return checks.number(name, value, 1e-9, LARGEST)
+    return checks.number(name, value, *POSITIVE)
 
 
 def weights(of_task: Mapping[str, float], of_body: Mapping[str, float] = {}, changed: Any = None) -> dict[str, float]:

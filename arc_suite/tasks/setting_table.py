@@ -11,6 +11,7 @@ import numpy as np
 from arc_suite.arenas import ARENAS, terrain
 from arc_suite.robots import gaits
 from arc_suite.tasks import parameters
+from arc_suite.tasks.command_task import CommandTask
 from arc_suite.tasks.contract import STEPS, Task
 from arc_suite.tasks.ground import LEVELS
 from arc_suite.tasks.modifiers import MODIFIERS, bounds
@@ -42,10 +43,12 @@ _BOUNDS = {
     "difficulty": (0.0, 1.0),
     "level": (0, LEVELS - 1),
     "terrain_seed": (0, 2**32 - 1),
-    "cost_limit": (0.0, parameters.LARGEST),
-    "velocity_band": (0.0, parameters.LARGEST),
+    "cost_limit": parameters.POSITIVE,
+    "velocity_band": parameters.POSITIVE,
+    "time_limit": parameters.POSITIVE,
     "fall_seed": (0, 2**32 - 1),
 }
+_UNBOUNDED = (-parameters.LARGEST, parameters.LARGEST)
 
 
 class Setting(NamedTuple):
@@ -54,7 +57,7 @@ class Setting(NamedTuple):
     Attributes:
         name: its name in `task_kwargs`.
         value: its value; "-" where it has none.
-        bounds: its lowest and highest number, such as "0 to 1"; "-" where it has none, or is no number.
+        bounds: its lowest and highest number, such as "0 to 1" or "above 0"; "-" where it has none, or is no number.
         meaning: what it is, with its unit.
     """
 
@@ -80,7 +83,8 @@ def own_settings(task: Task, task_kwargs: Mapping[str, Any] = {}) -> list[Settin
     for name, value in _fields(task.settings).items():
         if name not in (*names, *_PARTS) and _is_plain(value):
             names.append(name)
-    return [_describe(name, values, meanings) for name in names]
+    limits = _BOUNDS | _bounds_of_task(task)
+    return [_describe(name, values, meanings, limits) for name in names]
 
 
 def shared_settings(task_kwargs: Mapping[str, Any] = {}) -> list[Setting]:
@@ -95,7 +99,8 @@ def shared_settings(task_kwargs: Mapping[str, Any] = {}) -> list[Setting]:
     names = ["random", "time_limit", "arena", "on_divergence", *values]
     values |= task_kwargs
     meanings = modifier_meanings() | _MEANINGS_WITHOUT_FIELD
-    return [_describe(name, values, meanings) for name in names]
+    limits = _BOUNDS | bounds()
+    return [_describe(name, values, meanings, limits) for name in names]
 
 
 def modifier_meanings() -> dict[str, str]:
@@ -106,10 +111,10 @@ def modifier_meanings() -> dict[str, str]:
     return meanings
 
 
-def bounds_of(name: str) -> str:
-    """Return the bounds of a setting as text; "-" if it has none, or is no number."""
-    limits = _BOUNDS | bounds()
-    low, high = limits.get(name, (-parameters.LARGEST, parameters.LARGEST))
+def format_bounds(low: float, high: float) -> str:
+    """Return the lowest and the highest number of a setting as text; "-" if it has no bounds."""
+    if (low, high) == parameters.POSITIVE:
+        return "above 0"
     if high < parameters.LARGEST:
         return f"{low:g} to {high:g}"
     return f"from {low:g}" if low > -parameters.LARGEST else "-"
@@ -157,9 +162,22 @@ def _is_plain(value: Any) -> bool:
     return value is None or isinstance(value, str | numbers.Number)
 
 
-def _describe(name: str, values: Mapping[str, Any], meanings: Mapping[str, str]) -> Setting:
+def _bounds_of_task(task: Task) -> dict[str, tuple[float, float]]:
+    """Return the bounds that follow from a task and its body, by name of the setting."""
+    _, highest_width = terrain.SIZES["width"]
+    limits = {"width": (terrain.min_width(task.scene.body), highest_width)}
+    if isinstance(task, CommandTask):  # commands give the direction
+        _, highest_speed = parameters.BOUNDS["target_velocity"]
+        limits["target_velocity"] = (parameters.MIN_SPEED, highest_speed)
+    return limits
+
+
+def _describe(
+    name: str, values: Mapping[str, Any], meanings: Mapping[str, str], limits: Mapping[str, tuple[float, float]]
+) -> Setting:
     value = format_value(values[name]) if name in values else "-"
-    return Setting(name, value, bounds_of(name), meanings.get(name, ""))
+    low, high = limits.get(name, _UNBOUNDED)
+    return Setting(name, value, format_bounds(low, high), meanings.get(name, ""))
 
 
 def _read_meanings(task: Task) -> dict[str, str]:

@@ -44,6 +44,26 @@ def test_a_setting_shows_what_follows_from_it():
     assert float(settings["duty_factor"][0]) == pytest.approx(5 / 6, abs=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("task", "name", "lowest", "refused_value", "text"),
+    [
+        ("steer", "target_velocity", 0.001, 0.0009, "0.001 to 1000"),
+        ("walk", "target_velocity", -1000.0, -1001.0, "-1000 to 1000"),
+        ("leap", "width", 0.0225, 0.022, "0.0225 to 1000"),
+        ("steer", "cost_limit", 1e-6, 0.0, "above 0"),
+        ("walk", "velocity_band", 1e-6, 0.0, "above 0"),
+        ("walk", "time_limit", 1e-6, 0.0, "above 0"),
+    ],
+)
+def test_bounds_are_those_that_the_task_takes(task, name, lowest, refused_value, text):
+    definition = arc_suite.load("tick", task).task.definition
+    settings = [*setting_table.own_settings(definition), *setting_table.shared_settings()]
+    assert {setting.name: setting.bounds for setting in settings}[name] == text
+    arc_suite.load("tick", task, {name: lowest})
+    with pytest.raises(ValueError, match=f"^{name}: expected a"):
+        arc_suite.load("tick", task, {name: refused_value})
+
+
 def test_settings_of_bodies_and_tasks_of_users(tmp_path):
     (tmp_path / "ice.py").write_text(
         "import arc_suite\nfrom arc_suite.tasks.walk import Walk\n\n\nclass Ice(Walk):\n"

@@ -83,7 +83,10 @@ BOUNDED = [
 
 @pytest.mark.parametrize(("task", "name"), BOUNDED)
 def test_bounds_are_those_of_the_task(task, name):
-    low, _, high = setting_table.bounds_of(name).removeprefix("from ").partition(" to ")
+    definition = Setup.of("tick", task).definition
+    settings = [*setting_table.own_settings(definition), *setting_table.shared_settings()]
+    (limits,) = [setting.bounds for setting in settings if setting.name == name]
+    low, _, high = limits.removeprefix("from ").removeprefix("above ").partition(" to ")
     outside = [float(low) - 1, *([float(high) + 1] if high else [])]
     for value in outside:
         with pytest.raises(ValueError, match=name):
