@@ -6,6 +6,7 @@ import imports
 import numpy as np
 import programs
 import pytest
+import tiny_studies
 from networks import made, of_many_bodies
 
 import arc_suite
@@ -145,3 +146,18 @@ def test_flags_may_name_the_robot_and_task_of_a_policy(tmp_path):
     assert programs.passed(done).startswith("wrote b.onnx: ")
     done = programs.arc_suite("export", policy, "--robot=queen", "--output=c.onnx", cwd=tmp_path)
     programs.refused(done, f"arc-suite export: policy {policy}: trained on tick, walk, ")
+
+
+def test_files_of_a_run_have_the_delay_of_its_training(tmp_path):
+    """Those of `train` and of `export`, whichever of its policies is named."""
+    arguments = ["--robot=tick", "--algorithm=tiny_studies:climb", "--set", "time_limit=0.25", "--steps=20"]
+    command = ["train", *arguments, "--train_set", "delay=[1,2]", "--best", "--output=run"]
+    programs.passed(programs.arc_suite(*command, cwd=tmp_path, path=tiny_studies.__file__.rpartition("/")[0]))
+    files = ["run/policy.onnx"]
+    for policy in ("run", "run/policy.npz", "run/best", "run/checkpoints/20"):
+        file = f"{len(files)}.onnx"
+        programs.passed(programs.arc_suite("export", policy, f"--output={file}", cwd=tmp_path))
+        files.append(file)
+    for file in files:
+        session = runtime.InferenceSession(tmp_path / file, providers=["CPUExecutionProvider"])
+        assert json.loads(session.get_modelmeta().custom_metadata_map["delay"]) == [1, 2], file

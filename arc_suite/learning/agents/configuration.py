@@ -145,9 +145,7 @@ class Configuration:
             ValueError: a setting that does not fit, or one that changes observations or actions.
         """
         policy_setup = self.policy_setup
-        # The difficulty is that of evaluations: levels of a curriculum have their own.
-        dropped = ("difficulty",) if self.training.get(CURRICULUM) else ()
-        training_setup = policy_setup.with_settings(self.training, dropped)
+        training_setup = apply_training(policy_setup, self.training)
         if training_setup != policy_setup:
             training_task = training_setup.definition
             policy_task = policy_setup.definition
@@ -415,6 +413,13 @@ def _check_training(setup: Setup, definition: algorithms.Algorithm, training: Ma
         if name in ("random", "exclude_blocks"):
             reason = "as every run has a seed" if name == "random" else "as it is a hyperparameter"
             raise ValueError(f"training: setting {name}: expected none, {reason}, got {checks.preview(training[name])}")
+
+
+def apply_training(policy_setup: Setup, training: Mapping[str, Any]) -> Setup:
+    """Return the setup in which a policy of a setup learns, given the settings of training."""
+    # The difficulty is that of evaluations: levels of a curriculum have their own.
+    dropped = ("difficulty",) if training.get(CURRICULUM) else ()
+    return policy_setup.with_settings(training, dropped)
 
 
 def read(path: Path) -> Configuration:

@@ -23,7 +23,7 @@ from pathlib import Path
 
 from absl import flags
 
-from arc_suite import files, policies
+from arc_suite import checks, files, policies
 from arc_suite.bodies import universal
 from arc_suite.cli import outputs
 from arc_suite.cli.flags import (
@@ -40,8 +40,9 @@ from arc_suite.cli.flags import (
     task_from_flags,
 )
 from arc_suite.envs.setup import Setup
-from arc_suite.learning import onnx_file, runner_files
+from arc_suite.learning import best, onnx_file, runner_files
 from arc_suite.learning.agents import configuration, run_folder
+from arc_suite.policies import checkpoints, network
 from arc_suite.policies.network import Network
 
 FLAGS = flags.FLAGS
@@ -68,7 +69,7 @@ def main(run: str | None = None) -> None:
     outputs.check_extension(output, [".onnx"])
     files.check_target(FLAGS.output)
     policy = _read_policy(run, name)
-    training = configuration.read(path / run_folder.CONFIG).training_setup if run_folder.is_begun(path) else None
+    training = _training_setup(path)
     if FLAGS.runner is not None:
         if FLAGS.output is not None:
             raise ValueError(f"--output {FLAGS.output}: goes without --runner, which names a folder")
@@ -77,6 +78,31 @@ def main(run: str | None = None) -> None:
         return
     onnx_file.save(output, policy, training)
     print(f"wrote {output}: {policy.size} observations, {policy.joints} actions, {output.stat().st_size} bytes")
+
+
+def _training_setup(policy: Path) -> Setup | None:
+    """Return the setup in which the policy of a run learned; None for a policy that is of no run.
+
+    Args:
+        policy: folder of a run, that of its best policy or of a checkpoint, or the policy file in one of them.
+
+    Raises:
+        ValueError: a damaged configuration.
+    """
+    folder = policy.absolute()
+    if folder.name == network.FILE:
+        folder = folder.parent
+    folders = [folder]
+    if folder.name == best.FOLDER:
+        folders.append(folder.parent)
+    if folder.parent.name == checkpoints.FOLDER:
+        folders.append(folder.parents[1])
+    run = next(filter(run_folder.is_begun, folders), None)
+    if run is None:
+        return None
+    # The algorithm may be of a package that is not imported: an export needs only the settings.
+    training = checks.mapping("training", run_folder.read_config(run).get("training", {}))
+    return configuration.apply_training(network.load(policy).setup, training)
 
 
 def _read_policy(run: str, name: str) -> Network:

@@ -342,7 +342,7 @@ def train_seeds_on_device(runs: Sequence[Configuration]) -> int:
 def save_onnx(run: Configuration, folder: Path) -> None:
     """Write the policy of a run of one body in ONNX's format, if ONNX is installed."""
     if importlib.util.find_spec("onnx") and not run.setup.several:
-        onnx_file.save(folder / "policy.onnx", network.load(folder))
+        onnx_file.save(folder / "policy.onnx", network.load(folder), run.training_setup)
 
 
 def update_bars(folder: Path, bars: Mapping[str, Any]) -> None:
