@@ -239,8 +239,8 @@ def _list_swinging_geoms(body: Body, model: mujoco.MjModel) -> list[_SwingingGeo
 
 
 @functools.lru_cache(maxsize=8)
-def _compile_for_pictures(body: Body, arena: Arena, quality: Quality, looks: str) -> Decorated:
-    """Return the decorated body of all pictures with the same `visuals.looks_of`, for OpenGL's thread alone."""
+def _compile_for_pictures(body: Body, arena: Arena, quality: Quality, visuals_key: str) -> Decorated:
+    """Return the decorated body of all pictures with the same `visuals.key_of`, for OpenGL's thread alone."""
     return Decorated.from_body(body, arena, quality)
 
 
@@ -299,7 +299,7 @@ def picture(
         scale = min(drawn_quality.scale, MAX_SCALE * MAX_HEIGHT // height, MAX_SCALE * MAX_WIDTH // width)
 
     def draw():
-        decorated = _compile_for_pictures(body, arena, drawn_quality, visuals.looks_of(body))
+        decorated = _compile_for_pictures(body, arena, drawn_quality, visuals.key_of(body))
         if isinstance(camera_id, mujoco.MjvCamera):
             check_placed_camera(decorated.model.ptr, camera_id)
         else:

@@ -18,12 +18,12 @@ _IMPEDANCE = (0.97, 0.995, 0.001, 0.5, 2.0)  # MuJoCo's solimp
 
 def compile_on_hard_ground(body: Body) -> mujoco.MjModel:
     """Return a new model of a body on hard ground, which the caller may change."""
-    return copy.copy(_shared_model(body, visuals.looks_of(body)))
+    return copy.copy(_shared_model(body, visuals.key_of(body)))
 
 
 @functools.lru_cache(maxsize=8)
-def _shared_model(body: Body, looks: str) -> mujoco.MjModel:
-    """Return the model of `compile_on_hard_ground`, the same one for the same `visuals.looks_of`."""
+def _shared_model(body: Body, visuals_key: str) -> mujoco.MjModel:
+    """Return the model of `compile_on_hard_ground`, the same one for the same `visuals.key_of`."""
     model = compile_model(body) if body.source else _compile_with_drawn_shapes(body)
     harden(model)
     return model

@@ -44,7 +44,7 @@ def measure_ground(body: Body, motion: ClipMotion) -> Ground:
 
     The end of a leg next to its foot is a part of the foot.
     """
-    parts, points_of_parts = _drawn_points(body, visuals.looks_of(body))
+    parts, points_of_parts = _drawn_points(body, visuals.key_of(body))
     radius_of_foot = {name: leg.foot.radius for name, leg in zip(body.foot_names, body.legs, strict=True)}
     poses = Pose(motion.positions, motion.quaternions, motion.joints)
     positions, orientations = part_frames(pose_parts(parts, poses))
@@ -111,12 +111,12 @@ def raise_out_of_ground(body: Body, motion: ClipMotion, fixed_ends: Sequence[int
 
 
 @functools.lru_cache(maxsize=8)
-def _drawn_points(body: Body, looks: str) -> tuple[Sequence[Part], list[np.ndarray]]:
+def _drawn_points(body: Body, visuals_key: str) -> tuple[Sequence[Part], list[np.ndarray]]:
     """Return the parts of a body, and the points (n, 3) of their meshes in their frames, m; without ends at feet.
 
     Args:
         body: any body.
-        looks: of `visuals.looks_of`, as a key of the cache.
+        visuals_key: of `visuals.key_of`, for the cache.
     """
     parts, _ = describe_body(body)
     points_of_parts = []

@@ -24,12 +24,12 @@ _SHADE = 0.45  # of a face that the light does not reach
 
 def body_picture(body: Body) -> str:
     """Return a picture of a body as it stands, as a value of CSS."""
-    return _draw_body(body, visuals.looks_of(body))
+    return _draw_body(body, visuals.key_of(body))
 
 
 @functools.lru_cache(maxsize=64)
-def _draw_body(body: Body, looks: str) -> str:
-    """Return the picture of `body_picture`, the same one for the same `visuals.looks_of`."""
+def _draw_body(body: Body, visuals_key: str) -> str:
+    """Return the picture of `body_picture`, the same one for the same `visuals.key_of`."""
     triangles, colors = _body_triangles(body)
     camera = _CAMERA / np.linalg.norm(_CAMERA)
     right = np.cross((0.0, 0.0, 1.0), camera)

@@ -96,7 +96,7 @@ def _visuals(body: Body) -> Visuals:
     return visuals if body.ornaments else visuals._replace(ornaments=(), bones=())
 
 
-def looks_of(body: Body) -> str:
+def key_of(body: Body) -> str:
     """Return a text for keys of caches, which changes with the visuals that are registered under a body's name."""
     return repr(VISUALS.get(body.name))
 
