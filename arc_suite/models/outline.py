@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
-from arc_suite.robots.spec import Body, Leg, Solid, Vector
+from arc_suite.robots.spec import Body, Leg, Solid
 
 # Corners (8, 3) of a box with half-extents of 1.
 CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
@@ -24,7 +24,7 @@ def level_extents(solid: Solid) -> np.ndarray:
     return np.sqrt(rotation**2 @ np.square(ellipsoid)) + abs(rotation) @ box
 
 
-def _split(solid: Solid) -> tuple[Vector, Vector]:
+def _split(solid: Solid) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return half-extents of an ellipsoid and of a box, m, whose sums of extents are those of a solid in any turn."""
     radius = solid.size[0]
     half_length = solid.size[-1]  # without the ends of a capsule
