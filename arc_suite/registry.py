@@ -152,6 +152,13 @@ def _find_body(name: str) -> Body | None:
         return None
 
 
+def is_body_of_suite(body: Body) -> bool:
+    """Return whether a body is a robot, a packaged spec or of a family of the suite, which no package registered."""
+    family, _, _ = body.name.rpartition("_")
+    is_registered = ("robot", body.name) in MODULE_OF_NAME or ("family", family) in MODULE_OF_NAME
+    return not is_registered and _find_body(body.name) == body
+
+
 def robot_words() -> list[str]:
     """Return words for bodies: names of all robots and packaged specs, and for each family one of its bodies."""
     return [*ROBOTS, *EXAMPLES, *_family_words()]

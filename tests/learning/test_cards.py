@@ -13,9 +13,11 @@ import tiny_studies
 
 import arc_suite
 from arc_suite import learning, registry, versions
-from arc_suite.learning import cards
+from arc_suite.evaluation import judging
+from arc_suite.learning import cards, finals
 from arc_suite.learning.agents import configuration, run_folder
 from arc_suite.learning.agents.configuration import Configuration
+from arc_suite.policies import network
 from arc_suite.tasks.walk import Walk
 
 SETTINGS = {"time_limit": 0.25}
@@ -63,16 +65,33 @@ def test_a_card_says_what_a_hub_and_a_reader_want(run, folder, monkeypatch):
     assert f"| module tiny_studies | sha256 {sha256} |" in card
 
 
-@pytest.mark.slow
+TICK = registry.ROBOTS["tick"]
+
+
 @pytest.mark.parametrize(
-    ("name", "several", "of_suite"),
-    [("tick", False, True), ("spider", False, True), ("varied:0-9", True, True), ("dachs", False, False)],
+    ("robot", "of_suite"),
+    [
+        ("tick", True),
+        ("spider", True),
+        ("random:7", True),
+        ("few_legs:3", True),
+        ("varied:0-9", True),
+        (TICK.replace(name="dachs"), False),
+        (TICK.replace(name="spider"), False),
+        (TICK.replace(name="random_7"), False),
+        (TICK.replace(name="random_x"), False),
+    ],
 )
-def test_bodies_of_others_have_licenses_of_their_own(name, several, of_suite):
-    run = types.SimpleNamespace(setup=types.SimpleNamespace(name=name, several=several), parts_of_others=())
+def test_bodies_of_others_have_licenses_of_their_own(robot, of_suite):
+    run = types.SimpleNamespace(setup=arc_suite.Setup.of(robot), parts_of_others=())
     assert cards._is_of_suite(run) == of_suite
     assert ("looks are the suite's" in cards._license_text(run)) == of_suite
-    assert (f"`{name}` is no robot of the suite" in cards._license_text(run)) != of_suite
+    assert (f"`{run.setup.name}` is no robot of the suite" in cards._license_text(run)) != of_suite
+
+
+def test_a_generated_body_of_a_family_of_others_is_none_of_the_suite(carrier):
+    run = Configuration.of(arc_suite.Setup.of("outside:swarm:0"), "dagger")
+    assert not cards._is_of_suite(run)
 
 
 OF_AUTHOR = "The license of this policy is for its author to state: set `license` at the head of this card."
@@ -84,7 +103,9 @@ def carrier(monkeypatch):
     before = [dict(table) for table in (registry.ROBOTS, registry.TASKS, registry.FAMILIES, registry.MODULE_OF_NAME)]
     body = registry.ROBOTS["tick"].replace(name="mantis")
     carry = type("Carry", (Walk,), {"name": "carry"})
-    arc_suite.register(module="outside", body=body, tasks=(carry,), families={"swarm": lambda seed: body})
+    arc_suite.register(
+        module="outside", body=body, tasks=(carry,), families={"swarm": lambda seed: body.replace(name=f"swarm_{seed}")}
+    )
     monkeypatch.setitem(sys.modules, "outside", types.ModuleType("outside"))
     yield
     tables = (registry.ROBOTS, registry.TASKS, registry.FAMILIES, registry.MODULE_OF_NAME)
@@ -126,6 +147,28 @@ def test_parts_of_others_leave_the_license_to_the_author(carrier, robot, task, a
     assert text == line if line else text.startswith("Not of the suite: the family `outside:swarm`. ")
     is_of_suite = text.startswith("Apache-2.0")
     assert f'license: "{"apache-2.0" if is_of_suite else "other"}"' in cards._metadata(run, 1.0)
+
+
+def test_a_card_tells_the_returns_of_its_policy_and_not_of_an_earlier_one(tmp_path, monkeypatch):
+    """A run that goes on after its judging has other episodes until the next one."""
+    monkeypatch.setattr(cards, "_draw", lambda run, folder: None)
+    settings = {"algorithm": "tiny_studies:climb", "task_kwargs": SETTINGS, "folder": tmp_path / "run"}
+    policy = learning.train("tick", steps=20, **settings)
+    run = configuration.read(tmp_path / "run" / "config.json")
+    sha256 = network.digest(policy)
+    seeds = judging.seeds_of(sha256)
+    rows = [f"{sha256},{seed},7.0,5" for seed in seeds]
+
+    def write_finals(rows):
+        (tmp_path / "run" / "final.csv").write_text("\n".join([",".join(finals.COLUMNS), *rows, ""]))
+        return cards.write(run, tmp_path / "run").read_text()
+
+    judged = f"| return | 7.0, 95 % interval [7.0, 7.0], {len(seeds)} judging episodes |"
+    assert judged in write_finals(rows)
+    latest = run_folder.latest_returns(run_folder.table(tmp_path / "run", "evaluations"))
+    for other_rows in ([row.replace(sha256, "0" * 64) for row in rows], rows[:-1]):
+        card = write_finals(other_rows)
+        assert f"| return | {latest.mean():.1f}, " in card and "10 episodes of the latest evaluation |" in card
 
 
 def test_the_program_draws_the_policy(folder):
