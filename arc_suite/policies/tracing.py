@@ -75,11 +75,10 @@ class _Writer:
         shape = self.shapes[name]
         return Traced(self, name, np.arange(math.prod(shape)).reshape(shape))
 
-    def constant(self, value: Any) -> "Traced":
-        """Add an array."""
+    def constant(self, value: Any, dtype: type = np.float32) -> "Traced":
+        """Add an array, of int32 for indices."""
         array = np.asarray(value)
         name = str(len(self.arrays))
-        dtype = np.int32 if array.dtype.kind == "i" else np.float32
         self.arrays[name] = array.astype(dtype, order="C")
         self.shapes[name] = array.shape
         return self.array(name)
@@ -121,7 +120,7 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
             return self.source
         if self.places.shape[:1] != (1,):
             raise ValueError(f"expected a first axis of length 1, of environments, got shape {self.places.shape}")
-        indices = self._writer.constant(self.places[0])
+        indices = self._writer.constant(self.places[0], np.int32)
         return self._writer.node("Take", self.source, indices.name).source
 
     def node(self, operator: str, *operands: Any) -> "Traced":
@@ -187,7 +186,10 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
         return Traced(self._writer, self.source, places)
 
     def _node(self, operator: str, *inputs: Any) -> "Traced":
-        operands = [operand if isinstance(operand, Traced) else self._writer.constant(operand) for operand in inputs]
+        dtype = np.int32 if operator == "Take" else np.float32
+        operands = [
+            operand if isinstance(operand, Traced) else self._writer.constant(operand, dtype) for operand in inputs
+        ]
         return self._writer.node(operator, *(operand.name for operand in operands))
 
 
@@ -200,7 +202,7 @@ def _refuse(name: str) -> NoReturn:
 def apply_graph(graph: Graph, inputs: Traced) -> Traced:
     """Return the results of a graph for inputs (1, size) that another graph computes."""
     results: dict[str | int, Traced] = {INPUT: inputs}
-    results |= {name: inputs._writer.constant(array) for name, array in graph.arrays.items()}
+    results |= {name: inputs._writer.constant(array, array.dtype) for name, array in graph.arrays.items()}
     for index, (operator, names) in enumerate(graph.nodes):
         results[index] = inputs._node(operator, *(results[name] for name in names))
     last = len(graph.nodes) - 1

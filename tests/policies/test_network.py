@@ -15,7 +15,7 @@ from arc_suite.bodies import generator
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import network
-from arc_suite.policies.graph import OPERATORS
+from arc_suite.policies.graph import OPERATORS, check_graph
 from arc_suite.policies.tracing import traced
 from arc_suite.robots import ROBOTS
 
@@ -127,6 +127,28 @@ def test_a_graph_computes_products_and_hyperbolic_tangents_as_numpy_writes_them(
     weight = np.arange(8.0).reshape(4, 2)
     graph = traced(lambda x: np.tanh(x @ weight), 4)
     assert [node.operator for node in graph.nodes] == ["Product", "Tanh"]
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda x: x.clip(-1, 1),
+        lambda x: x.clip(0, 1),
+        lambda x: x * 2,
+        lambda x: 1 - x,
+        lambda x: np.maximum(x, 0),
+        lambda x: x.reshape(len(x), 3, 2).sum(1) / 3,
+        lambda x: np.concatenate([x[:, :1], np.array([[1]])], axis=1),
+        lambda x: x @ np.arange(12).reshape(6, 2),
+        lambda x: (x > 0) * 2,
+    ],
+)
+def test_integers_in_a_traced_function_are_numbers_as_others(function):
+    graph = check_graph(traced(function, 6), 6)
+    numbers = drawn(0)(1, 6)
+    result = graph(numbers)
+    assert result.dtype == np.float32
+    np.testing.assert_allclose(result, function(numbers), rtol=1e-6)
 
 
 def test_a_traced_function_computes_the_same_to_the_bit():
