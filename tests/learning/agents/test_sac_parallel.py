@@ -125,6 +125,16 @@ def test_values_that_do_not_fit(changes, line):
         algorithms.algorithm(NAME).with_hyperparameters(changes)
 
 
+@pytest.mark.parametrize(
+    ("num_envs", "utd_ratio", "updates"), [(100, 0.07, 7), (100, 0.29, 29), (3, 1 / 3, 1), (50, 0.14, 7), (4, 3.0, 12)]
+)
+def test_updates_of_a_step_are_whole_numbers_as_written(num_envs, utd_ratio, updates):
+    changes = {"num_envs": num_envs, "utd_ratio": utd_ratio}
+    hp = algorithms.algorithm(NAME).with_hyperparameters(changes).hyperparameters
+    assert hp.updates_of_a_step == updates
+    assert sum(count for count, _ in hp.update_groups()) == updates
+
+
 def test_blocks_may_come_from_a_list():
     hp = algorithms.algorithm(NAME).with_hyperparameters({"exclude_blocks": ["posture"]}).hyperparameters
     assert hp.exclude_blocks == ("posture",)
