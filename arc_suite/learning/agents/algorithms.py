@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from arc_suite import checks, registry, usage, versions
 from arc_suite.arenas import FLAT
 from arc_suite.envs.setup import Setup
@@ -90,7 +92,8 @@ class Algorithm(NamedTuple):
                 )
             checks.name(name, fields, "hyperparameter")
         for name, value in {**_device_changes(fields, changes), **changes}.items():
-            changed_fields[name] = tuple(value) if isinstance(value, list) else value
+            plain_value = value.item() if isinstance(value, np.generic) else value
+            changed_fields[name] = tuple(plain_value) if isinstance(plain_value, list) else plain_value
             if not _has_type_of(changed_fields[name], fields[name]):
                 expected = f"{type(fields[name]).__name__} like {fields[name]!r}"
                 preview = checks.preview(changed_fields[name])

@@ -29,6 +29,17 @@ def test_a_configuration_holds_both():
     assert run.command.endswith(" --set=time_limit=1.0 '--train_set=friction=[0.5, 1.0]' --train_set=kicks=1.5")
 
 
+def test_a_configuration_holds_plain_numbers_of_numpy_ones():
+    changes = {"hidden": np.int64(8), "learning_rate": np.float64(0.25), "normalize": np.True_, "early_stop": "none"}
+    run = Configuration.of(STEER, "sac", changes, seed=np.int64(1), steps=np.int32(64), evaluate_every=np.uint8(32))
+    plain_changes = {"hidden": 8, "learning_rate": 0.25, "normalize": True, "early_stop": "none"}
+    plain_run = Configuration.of(STEER, "sac", plain_changes, seed=1, steps=64, evaluate_every=32)
+    assert run == plain_run and json.dumps(run.to_dict()) == json.dumps(plain_run.to_dict())
+    assert run.command == plain_run.command
+    with pytest.raises(ValueError, match=r"^seed: expected an integer from 0 to \d+, got np.float64\(1.0\)"):
+        Configuration.of(STEER, "sac", seed=np.float64(1.0))
+
+
 @pytest.mark.parametrize("name", ["ppo", "finetune", "dagger", "sac_parallel", "xqc"])
 def test_networks_leave_out_contact_forces_by_default(name):
     run = Configuration.of(STEER, name)
