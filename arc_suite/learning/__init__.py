@@ -56,11 +56,12 @@ def train(
     setup = Setup.of(robot, task, task_kwargs)
     cores.prepare_jax()
     from arc_suite.learning.agents import training as trainer  # not before: programs without learners are light
-    from arc_suite.learning.agents.configuration import Configuration
+    from arc_suite.learning.agents.configuration import Configuration, with_network_of_folder
 
     run = Configuration.of(setup, algorithm, hyperparameters, seed, steps, evaluate_every, prior, training)
     with contextlib.ExitStack() as stack:
         output = Path(folder) if folder else Path(stack.enter_context(tempfile.TemporaryDirectory()), run.name)
+        run = with_network_of_folder(run, output)
         trainer.train(run, output, minutes, progress=progress, on_metrics=on_metrics)
         policy = output / network.FILE
         if not policy.exists():  # the minutes ended before the first evaluation

@@ -12,7 +12,7 @@ import numpy as np
 
 from arc_suite import checks, evaluation, files, registry, versions
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.agents import algorithms
+from arc_suite.learning.agents import algorithms, run_folder
 from arc_suite.learning.agents.hyperparameters import BLOCKS_LEFT_OUT
 from arc_suite.learning.agents.learner import MAX_RUN_SEED, RunContext
 from arc_suite.learning.agents.run_folder import COMMIT, LEG_VIEWS, MODEL_HASH, MODULE
@@ -45,6 +45,8 @@ PROVENANCE_FIELDS = (
 
 # Hyperparameters whose values are names that other packages may have registered, and the kinds of these names.
 _KINDS_OF_NAMES = {"network": "network", "preset": "law"}
+
+_NETWORK_OF_START = ("network", "hidden")  # hyperparameters that are those of the policy that a run starts from
 
 
 @dataclasses.dataclass(frozen=True)
@@ -100,17 +102,17 @@ class Configuration:
         changes = hyperparameters or {}
         definition = algorithms.algorithm(algorithm).with_hyperparameters(changes)
         start = getattr(definition.hyperparameters, "start", "")
-        if start and not setup.several and not {"network", "hidden"} <= changes.keys():
+        if start and not setup.several and not set(_NETWORK_OF_START) <= changes.keys():
             definition = definition.with_hyperparameters({**network_hyperparameters(start), **changes})
         if setup.several:
             _check_learns_several(setup, algorithm, definition)
         if steps is None:
             steps = definition.steps_of(setup)
-        checks.integer("steps", steps, 1)
+        steps = checks.integer("steps", steps, 1)
         if evaluate_every is None:
             evaluate_every = definition.evaluate_every_of(steps)
-        checks.integer("seed", seed, 0, MAX_RUN_SEED)
-        checks.integer("evaluate_every", evaluate_every, 1)
+        seed = checks.integer("seed", seed, 0, MAX_RUN_SEED)
+        evaluate_every = checks.integer("evaluate_every", evaluate_every, 1)
         if not isinstance(prior, str | None):
             raise ValueError(f"prior: expected the id of a dataset, got {checks.preview(prior)}")
         training = {**setup.kind.training, **checks.mapping("training", training)}
@@ -372,10 +374,33 @@ def _with_modules(hyperparameters):
     return dataclasses.replace(hyperparameters, **changes)
 
 
+def with_network_of_folder(run: Configuration, folder: str | os.PathLike[str]) -> Configuration:
+    """Return the configuration of a run that goes on in a folder.
+
+    Where the policy that it started from is gone, the folder has the network in its place.
+
+    Raises:
+        ValueError: no folder of a run.
+        OSError: its record cannot be read.
+    """
+    start = getattr(run.hyperparameters, "start", "")
+    if not start or run.setup.several or os.path.exists(start) or not run_folder.is_begun(folder):
+        return run
+    recorded_values = checks.mapping("hyperparameters", run_folder.read_config(folder).get("hyperparameters"))
+    defaults = run.default_hyperparameters
+    changes = {
+        name: recorded_values[name]
+        for name in defaults.keys() & recorded_values.keys() & set(_NETWORK_OF_START)
+        if getattr(run.hyperparameters, name) == defaults[name]
+    }
+    return dataclasses.replace(run, hyperparameters=dataclasses.replace(run.hyperparameters, **changes))
+
+
 def network_hyperparameters(start: str | os.PathLike[str]) -> dict[str, Any]:
     """Return the hyperparameters of the network of a policy file.
 
-    They are empty if there is no file, as a run may resume without the policy that it started from.
+    They are empty if there is no file, as a run may resume without the policy that it started from; see
+    `with_network_of_folder`.
     """
     try:
         graph = network.load(start).graph

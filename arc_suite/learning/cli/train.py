@@ -191,6 +191,7 @@ def train_run(run: Configuration, threshold: float | None) -> int:
         threshold: mean return of an evaluation after which the run stops; None to train to the end.
     """
     folder = Path(FLAGS.output or Path(files.RUNS_FOLDER, run.name))
+    run = configuration.with_network_of_folder(run, folder)
 
     def success_step() -> int | None:
         return None if threshold is None else outcomes.first_step_above(folder, threshold)

@@ -13,13 +13,14 @@ pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 
 import jax
 
+import arc_suite
 from arc_suite.bodies import generator
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.learning.agents import architectures, on_policy, run_folder
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.architectures import Perceptron
-from arc_suite.learning.agents.configuration import Configuration
+from arc_suite.learning.agents.configuration import Configuration, with_network_of_folder
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.normalizer import Moments
 from arc_suite.learning.agents.training import train
@@ -280,6 +281,32 @@ def test_a_run_resumes_without_the_policy_that_it_started_from(tmp_path, imitate
     shutil.rmtree(imitated)
     assert train(run, tmp_path / "run", on_metrics=lambda step, metrics: seen.append(step))
     assert seen == [64, 64, 96, 96]
+
+
+def test_a_run_whose_start_is_gone_has_the_network_of_its_folder(tmp_path, imitated):
+    given_changes = {name: value for name, value in CHANGES.items() if name not in ("network", "hidden")}
+    changes = given_changes | {"start": str(imitated), "value_warm_up": 0}
+    settings = {"time_limit": 0.5}
+    setup = Setup.of("leaper", "walk", settings)
+    run = Configuration.of(setup, "finetune", changes, steps=64, evaluate_every=32)
+    folder = tmp_path / "run"
+
+    def stop(step, metrics):
+        if step == 64:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(run, folder, on_metrics=stop)
+    shutil.rmtree(imitated)
+    without_start = Configuration.of(setup, "finetune", changes, steps=64, evaluate_every=32)
+    assert without_start != run
+    assert with_network_of_folder(without_start, folder) == run
+    assert with_network_of_folder(without_start, tmp_path / "other") == without_start
+    other = Configuration.of(setup, "finetune", changes | {"hidden": 32}, steps=64, evaluate_every=32)
+    assert with_network_of_folder(other, folder).hyperparameters.hidden == 32
+    options = {"steps": 64, "evaluate_every": 32, "folder": folder}
+    arc_suite.learning.train("leaper", algorithm="finetune", task_kwargs=settings, hyperparameters=changes, **options)
+    assert run_folder.read_progress(folder)["evaluated"] == 64
 
 
 def test_a_start_that_does_not_fit_is_refused_in_one_line(begun, tmp_path, imitated):
