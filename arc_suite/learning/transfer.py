@@ -25,7 +25,7 @@ from arc_suite.robots import bastion, leaper, queen, tick
 from arc_suite.robots.spec import Body
 
 FIRST_TEST_SEED = 200_000  # of the bodies that test a policy; seeds of training and validation are lower
-STEPS = 400  # control steps of an episode
+STEPS = 400  # control steps of an episode, unless the task's limit is shorter
 _WORST_SHARE = 0.1  # share of the bodies that count in the worst score
 _ROBOTS = (queen.BODY, bastion.BODY, tick.BODY, leaper.BODY)  # stays as it is, as results name a body by its index
 
@@ -247,7 +247,7 @@ def _play_episodes(environment: BodiesEnv, policy: Policy, bar: tqdm) -> list[Ju
             targets[:length, index],
             displacements[:length, index],
             touching[: length + 1, index],
-            STEPS,
+            min(STEPS, environment.tasks[index].step_limit),
             walking.FALL if fell else walking.TIME,
         )
         tracking = episode.progress.get("tracking", math.nan)

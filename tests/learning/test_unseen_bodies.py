@@ -98,6 +98,17 @@ def test_a_walk_in_a_batch_is_judged_as_one_alone(monkeypatch):
     assert played.demonstrator.walked == verdict.walks
 
 
+def test_a_time_limit_is_the_length_of_the_walk(monkeypatch):
+    """A shorter limit of the task gives the speeds of a trial of as many steps."""
+    bodies = [transfer.FAMILIES["robots"][0](2)]
+    settings = {"time_limit": 1.5}
+    (limited,) = transfer.compare(drawn(), bodies, "walk", settings)
+    monkeypatch.setattr(transfer, "STEPS", round(Setup.of(bodies[0], "walk", settings).definition.step_limit))
+    (short,) = transfer.compare(drawn(), bodies, "walk")
+    assert limited.demonstrator.speed == short.demonstrator.speed > 0.3
+    assert limited.demonstrator.walked == short.demonstrator.walked
+
+
 @pytest.mark.slow
 def test_tracking_of_tasks_with_a_command(monkeypatch):
     monkeypatch.setattr(transfer, "STEPS", 60)
