@@ -2,7 +2,7 @@
 
 A score is (return - standing still) / (demonstrator - standing still), each body with its own demonstrator: 0 is
 standing still, 1 the demonstrator. A demonstrator that hardly walks makes any score large, so speeds are shown, too.
-Each body plays 400 control steps.
+Each body plays 400 control steps, or up to the time limit of the task.
 
 `walk` is the share of bodies that walk: no fall, 0.7 of the target speed, the torso off the ground. `speed` is the
 policy's mean share of the target speed, and `tracking`, in tasks with a command, a share of the demonstrators'.
@@ -28,8 +28,13 @@ FLAGS = flags.FLAGS
 define_task()
 flags.DEFINE_string("policy", "universal", "Folder of a run of many bodies, a policy file, or universal.")
 flags.DEFINE_list("families", list(transfer.FAMILIES), "Families to play with, or files or module:name of bodies.")
-flags.DEFINE_string("output", None, "Table to add every episode to, CSV; those of before are replaced.", short_name="o")
-flags.DEFINE_string("name", None, "Of the policy in this table. [default: the stem of its path]")
+flags.DEFINE_string(
+    "output",
+    None,
+    "Table to add every episode to, CSV; earlier ones of the policy and task are replaced.",
+    short_name="o",
+)
+flags.DEFINE_string("name", None, "Of the policy in this table. [default: --policy]")
 
 
 def main() -> None:
@@ -49,7 +54,8 @@ def main() -> None:
     else:
         refuse_flags(["name"], "goes with --output")
     # A policy of many bodies is the same in the task of any body; Queen's stands for all.
-    definition = Setup.of("queen", task, settings).definition
+    setup = Setup.of("queen", task, settings)
+    definition = setup.definition
     network = universal.load(FLAGS.policy, definition)
     universal.Universal(network, definition)  # raises an error now for a task in which it cannot act
     print(f"{'family':<10}" + "".join(f"{head:>13}" for head in transfer.TransferResult._fields))
@@ -60,4 +66,5 @@ def main() -> None:
         print(f"{name:<10}" + "".join(f"{number:>13.4g}" for number in numbers), flush=True)
         comparisons_by_family[name] = comparisons
     if FLAGS.output:
-        bodies.write(Path(FLAGS.output), FLAGS.name or Path(FLAGS.policy).stem, task, comparisons_by_family)
+        task_text = f"{task}, {setup.settings_json}" if setup.task_kwargs else task
+        bodies.write(Path(FLAGS.output), FLAGS.name or FLAGS.policy, task_text, comparisons_by_family)

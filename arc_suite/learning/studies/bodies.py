@@ -16,7 +16,7 @@ def write(path: Path, policy: str, task: str, comparisons: Mapping[str, Sequence
     Args:
         path: path of the table.
         policy: name of the policy.
-        task: name of the task.
+        task: name of the task, with its settings if there are any.
         comparisons: episodes of each body by family.
 
     Raises:

@@ -1,13 +1,16 @@
 """arc-suite transfer as users run it."""
 
 import csv
+import shutil
 
 import numpy as np
 import programs
 import pytest
 from networks import of_many_bodies as drawn
 
+from arc_suite.bodies import generator
 from arc_suite.policies import network
+from arc_suite.robots import spec_files
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +43,26 @@ def test_a_row_for_each_family_and_a_table_of_episodes(policy, tmp_path):
     walked = [line["walked"] for line in lines if line["who"] == "demonstrator"]
     assert walked == [str(int(speed >= 0.7)) for speed in speeds["demonstrator"]]
     assert float(row[3]) == walked.count("1") / 4
+
+
+def test_a_table_keeps_the_rows_of_other_policies_and_settings(policy, tmp_path):
+    """Also of runs whose names differ after a dot, and of the best policies of runs."""
+    spec_files.save_body(generator.random_body(3), tmp_path / "pup.json")
+    table = tmp_path / "table.csv"
+    names = [tmp_path / "varied.0-127-walk-dagger_bodies-0" / "best", tmp_path / "varied.0-63-steer-0" / "best"]
+    for name in names:
+        name.mkdir(parents=True)
+        shutil.copy(policy, name)
+    plays = [(names[0], 0.1), (names[1], 0.1), (names[0], 0.2), (names[0], 0.1)]
+    for name, limit in plays:
+        arguments = (f"--policy={name}", f"--families={tmp_path / 'pup.json'}", "--set", f"time_limit={limit}")
+        programs.passed(transfer(*arguments, "-o", table))
+    with table.open() as file:
+        rows = {(line["policy"], line["task"], line["who"]) for line in csv.DictReader(file)}
+        file.seek(0)
+        assert len(list(csv.DictReader(file))) == len(rows) == 9
+    expected = {(str(name), f'walk, {{"time_limit": {limit}}}') for name, limit in plays}
+    assert {row[:2] for row in rows} == expected
 
 
 @pytest.mark.parametrize(
