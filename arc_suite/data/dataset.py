@@ -5,7 +5,7 @@ import json
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import h5py
 
@@ -79,14 +79,24 @@ class Dataset:
     def __len__(self) -> int:
         return self._length
 
-    def __getitem__(self, index: int) -> Episode:
-        """Read one episode.
+    @overload
+    def __getitem__(self, index: int) -> Episode: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[Episode]: ...
+
+    def __getitem__(self, index):
+        """Read one episode, or the list of those of a slice.
 
         Raises:
             IndexError: there is no such episode.
-            ValueError: it is damaged.
+            ValueError: one is damaged.
         """
-        index = range(len(self))[index]
+        position = range(len(self))[index]
+        return [self._read(number) for number in position] if isinstance(index, slice) else self._read(position)
+
+    def _read(self, index: int) -> Episode:
+        """Return the episode of an index that exists; for errors see `__getitem__`."""
         joints = len(self.settings.setup.body.joint_names)
         with self.reading() as file:
             episode = episodes.read(file, index)

@@ -131,6 +131,14 @@ def test_normalized_scores_run_from_the_zero_policy_to_the_gaits_best():
     assert minari.get_normalized_score(dataset, 4.0 * 30) == 1.0
 
 
+def test_the_best_normalized_score_is_that_of_a_shorter_time_limit():
+    setup = Setup.of("queen", "walk", {"time_limit": 2.0})
+    for steps, length in ((1000, 40), (30, 30)):
+        collect(ID, data.DatasetSettings(setup, "zero", (), steps=steps), 1, overwrite=True)
+        assert len(data.open(ID)[0].actions) == length
+        assert data.open(ID).metadata["ref_max_score"] == 4.0 * length
+
+
 COLLECTED = {
     "presets and noise": data.DatasetSettings(QUEEN, "cpg", ("slow", "medium", "fast"), noise=0.1, **SHORT),
     "spider": data.DatasetSettings(SPIDER, "cpg", ("medium", "fast"), **SHORT),

@@ -37,6 +37,16 @@ def test_metadata():
     assert list(minari.list_local_datasets()) == [ID]
 
 
+def test_a_slice_is_a_list_of_episodes(kept):
+    dataset = data.open(ID)
+    sha256s = digests()
+    for part in (slice(0, 2), slice(None, None, -1), slice(-1, None), slice(5, 9)):
+        assert [episode.digest() for episode in dataset[part]] == sha256s[part]
+    assert dataset[-1].digest() == dataset[np.int64(len(dataset) - 1)].digest() == sha256s[-1]
+    with pytest.raises(IndexError):
+        dataset[len(dataset)]
+
+
 def test_style_records_a_dataset(kept):
     dataset = data.open(ID)
     environment = dataset.settings.setup.load()
