@@ -209,6 +209,7 @@ def _metadata(dataset_id: str, settings: DatasetSettings, provenance: dict, thre
     noise = f", with normal noise of standard deviation {settings.noise:g} on its actions" if settings.noise else ""
     environment = settings.environment(evaluation.CURVE_EPISODES, threads)
     with contextlib.closing(environment):
+        greatest_reward = terms.greatest(environment.task.definition.settings.weights)
         return {
             "dataset_id": dataset_id,
             "minari_version": minari_version,
@@ -222,7 +223,7 @@ def _metadata(dataset_id: str, settings: DatasetSettings, provenance: dict, thre
             f"{presets}{noise}; episode k has seed {settings.seed} + k.",
             "requirements": [f"{name}=={version}" for name, version in provenance["versions"].items() if version],
             "ref_min_score": _mean_return(environment, settings._replace(policy="zero", presets=(), noise=0.0)),
-            "ref_max_score": terms.greatest(environment.task.definition.settings.weights) * float(environment.step_limit),
+            "ref_max_score": greatest_reward * float(environment.step_limit),
             "num_episodes_average_score": evaluation.CURVE_EPISODES,
             "arc_suite": provenance,
         }

@@ -140,7 +140,10 @@ def _plot_curves(groups: Groups, demonstrators):
         curves = {}
         for kind, seeds in kinds.items():
             steps, mean_returns = results.curve(seeds)
-            curves[kind] = plots.Curve(seeds[0].run.configuration.algorithm, steps, mean_returns)
+            if steps.size:
+                curves[kind] = plots.Curve(seeds[0].run.configuration.algorithm, steps, mean_returns)
+        if not curves:  # unfinished runs, whose evaluations have no step in common
+            continue
         curves_by_place[place] = curves
         first_kind = next(iter(kinds.values()))
         setup = first_kind[0].run.configuration.setup

@@ -420,9 +420,8 @@ def final_returns(seeds: Sequence[RunResult]) -> np.ndarray:
 
 def curve(seeds: Sequence[RunResult]) -> tuple[np.ndarray, np.ndarray]:
     """Return the steps (points,) of the evaluations that all seeds have, and the mean returns (seeds, points)."""
-    count = min(len(result.steps) for result in seeds)
-    steps = seeds[0].steps[:count]
-    return steps, np.array([result.returns.mean(axis=1)[:count] for result in seeds])
+    steps = functools.reduce(np.intersect1d, (result.steps for result in seeds))
+    return steps, np.array([result.returns.mean(axis=1)[np.isin(result.steps, steps)] for result in seeds])
 
 
 def mean_size(values: np.ndarray) -> float:

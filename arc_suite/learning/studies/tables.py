@@ -2,6 +2,7 @@
 
 import collections
 import itertools
+import os
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -160,7 +161,7 @@ def study(name: str) -> Study:
     """Return the study `<division>-<algorithm>` of the benchmark, or `module:attribute`, a `Study` on Python's path.
 
     Raises:
-        ValueError: there is none, or two of its runs have one name.
+        ValueError: there is none, two of its runs have one name, or a label is no name of a folder.
     """
     division, _, algorithm = name.partition("-")
     if division in DIVISIONS:
@@ -177,6 +178,11 @@ def study(name: str) -> Study:
     imported = checks.import_object(name, "study")
     if not isinstance(imported, Study):
         raise ValueError(f"study {checks.preview(name)}: expected a Study, got {type(imported).__name__}")
+    labels = [run.label for run in imported.runs if os.sep in run.label]
+    if labels:
+        hint = f"as it names a folder; {checks.preview(labels[0].replace(os.sep, '-'))} is one"
+        label_text = f"label {checks.preview(labels[0])}"
+        raise ValueError(f"study {checks.preview(name)}: {label_text}: expected no {os.sep}, {hint}")
     run_names = collections.Counter(run.name for run in imported.runs)
     for run_name, count in run_names.items():
         if count > 1:

@@ -100,6 +100,23 @@ def test_a_score_is_that_of_the_end_and_minutes_are_those_of_the_first_half():
     assert (slow.policy_sha256, slow.first_seed) == ("ab" * 32, 4_200_000_000)
 
 
+def test_a_curve_has_the_steps_that_all_seeds_have():
+    often = result([0.1, 0.2, 0.3, 0.4], steps=(32, 64, 96, 128))
+    seldom = result([0.5, 0.6], steps=(64, 128), seed=1)
+    steps, means = results.curve([often, seldom])
+    np.testing.assert_array_equal(steps, [64, 128])
+    np.testing.assert_allclose(means, scale().at(np.array([[0.2, 0.4], [0.5, 0.6]])))
+    np.testing.assert_array_equal(results.curve([often])[0], often.steps)
+
+
+def test_a_label_that_is_no_name_of_a_folder_is_refused(monkeypatch):
+    runs = (tables.run("tick", "sac", 100, label="lr/2"),)
+    monkeypatch.setitem(globals(), "sliced", tables.Study("Rates", runs))
+    message = f"study '{__name__}:sliced': label 'lr/2': expected no /, as it names a folder; 'lr-2' is one"
+    with refused(message):
+        tables.study(f"{__name__}:sliced")
+
+
 def test_scores_of_ten_episodes_are_those_of_their_seeds():
     """In the first ten episodes of `steer`, Tick earns more by standing than in all hundred."""
     unpaired = result([0.0, 0.0], task="steer")._replace(finals=np.full(10, 1547.4))
