@@ -4,7 +4,7 @@ import drawn_motions
 import numpy as np
 import pytest
 
-from arc_suite import animation, motions, registry
+from arc_suite import animation, motions, registry, rotations
 from arc_suite.motions import reading
 
 
@@ -71,3 +71,21 @@ def test_motion_becomes_a_clip_and_comes_back(tmp_path):
         animation.animate("tick", tmp_path / "two.glb", [file] * 2)
     with pytest.raises(ValueError, match="motion 'walk' is of 'tick': expected a standing height of 0.75 m"):
         animation.animate("queen", tmp_path / "two.glb", file)
+
+
+@pytest.mark.parametrize("degrees", [150.0, 270.0, 500.0])
+@pytest.mark.parametrize("loops", [False, True])
+def test_a_large_turn_survives_fewer_keys(degrees, loops, tmp_path):
+    """In the track of the torso, or, of a loop, in that of the root."""
+    tick = registry.body_of("tick")
+    turns = np.radians(degrees) * np.linspace(0.0, 1.0, 61)
+    level = np.tile((1.0, 0.0, 0.0, 0.0), (61, 1))
+    positions = np.tile((0.0, 0.0, tick.torso.standing_height), (61, 1))
+    angles = np.zeros((61, len(tick.joint_names)))
+    motion = motions.make(tick, "spin", 60.0, loops, positions, rotations.turn_about_z(level, turns), angles)
+    file = str(tmp_path / "spin.npz")
+    motions.save(motion, file)
+    animation.animate("tick", tmp_path / "spin.glb", file, reduce=True, root_motion="moving")
+    copy, _ = reading.read(tmp_path / "spin.glb", tick)
+    assert copy.loops == loops
+    np.testing.assert_allclose(np.unwrap(rotations.yaw(copy.quaternions)), turns, atol=np.radians(0.1))
