@@ -82,6 +82,7 @@ def animate(
         progress: wraps what takes long, as `tqdm` does.
         options: options of a `.glb`, `rig`, `root_motion`, `triangles`, `uv` and `reduce`, see `creatures.glb`; of
             pictures, `size` in pixels, `transparent`, `turntable` of a film and `directions` of a sheet, see `filming`.
+            A number may be None, for its default.
 
     Raises:
         ValueError: an option that does not suit the file, or as `clips.clips`.
@@ -92,6 +93,7 @@ def animate(
     names = [clips] if isinstance(clips, str) else list(clips)
     path = Path(path)
     extension = _check_arguments(path, names, fps, options)
+    options = {name: value for name, value in options.items() if value is not None}
     clip_options: dict[str, Any] = {"weight": weight, "straight": straight, "plant": plant}
     recording_progress = functools.partial(progress, desc="recording", unit="clip", leave=False)
     with contextlib.ExitStack() as stack:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from arc_suite import animation
+from arc_suite import animation, motions
 from arc_suite.animation import clips as export
 from arc_suite.animation.clips import filming, sprites
 from arc_suite.envs.setup import Setup
@@ -96,3 +96,19 @@ def test_an_importer_reads_where_cells_are(tmp_path):
     assert meta["pixels_per_meter"] < 44.285 * 32 / SIZE
     assert np.ptp(picture[64:, 32 * attack_columns :], axis=(0, 1)).max() == 0  # cells after the last frame
     assert np.ptp(picture[64:, : 32 * attack_columns], axis=(0, 1)).max() > 0
+
+
+@pytest.mark.slow
+def test_numbers_of_none_are_the_defaults(tmp_path):
+    height = BODY.torso.standing_height
+    level = np.tile((1.0, 0.0, 0.0, 0.0), (2, 1))
+    angles = np.zeros((2, len(BODY.joint_names)))
+    motion = motions.make(BODY, "stand", 1.0, False, np.tile((0.0, 0.0, height), (2, 1)), level, angles)
+    motions.save(motion, tmp_path / "stand.npz")
+    pictures = []
+    for options in ({}, {"size": None, "directions": None}):
+        animation.animate(BODY, tmp_path / "stand.png", str(tmp_path / "stand.npz"), fps=1, **options)
+        pictures.append((tmp_path / "stand.png").read_bytes())
+    assert pictures[0] == pictures[1]
+    with Image.open(tmp_path / "stand.png") as picture:
+        assert picture.size == (2 * 480, 8 * 480)
