@@ -14,6 +14,7 @@ MAX_FRAMES = 1 << 16  # 18 minutes at 60 Hz
 MIN_RATE = 1.0  # Hz
 MAX_RATE = 1000.0  # Hz
 
+MAX_NAME = 200  # characters
 MAX_NUMBER = 1e5  # m, rad or standing heights
 MAX_PLANTED_HEIGHT = 0.03  # standing heights: a sole that is lower is planted
 MAX_SEAM = 0.05  # rad, or standing heights, between the last frame of a loop and its first
@@ -93,7 +94,7 @@ def make(
 
     Args:
         body: the body that moves.
-        name: of the motion.
+        name: of the motion, printable.
         frame_rate: Hz.
         loops: whether the motion repeats; the last frame is the first one, moved by a cycle's displacement.
         positions: (frames, 3) positions of the torso in the world, m.
@@ -102,13 +103,20 @@ def make(
         planted: (frames, legs) booleans; None for feet whose soles are near the ground.
 
     Raises:
-        ValueError: too few or too many frames, other shapes, numbers that are not finite, a loop that does not close.
+        ValueError: too few or too many frames, other shapes, numbers that are not finite, a loop that does not close,
+            or a name that is empty, too long or not printable.
     """
     legs = Legs.of(body)
     standing_height = body.torso.standing_height
     positions = np.asarray(positions, float)
-    quaternions = make_continuous(np.asarray(quaternions, float))
+    quaternions = np.asarray(quaternions, float)
     angles = np.asarray(angles, float)
+    frames = positions.shape[:1]  # a number has none
+    _check_shape("positions", positions, (*frames, 3))
+    _check_shape("quaternions", quaternions, (*frames, 4))
+    _check_shape("angles", angles, (*frames, len(body.joint_names)))
+    _check_frames(len(positions))
+    quaternions = make_continuous(quaternions)
     positions, quaternions = _start_at_origin(positions, quaternions)
     soles = find_soles(legs, positions, quaternions, angles) / standing_height
     rest_soles, rest_height = find_rest(body)
@@ -121,7 +129,7 @@ def make(
         joint_names=body.joint_names,
         leg_names=tuple([leg.name for leg in body.legs]),
         frame_rate=float(frame_rate),
-        loops=loops,
+        loops=checks.boolean("loops", loops),
         positions=positions,
         quaternions=quaternions,
         angles=angles,
@@ -134,23 +142,23 @@ def make(
 
 
 def check_motion(motion: Motion) -> Motion:
-    """Return a motion after a check of its numbers.
+    """Return a motion after a check of its name and its numbers.
 
     Raises:
         ValueError: see `make`.
     """
+    check_name("name", motion.name)
+    checks.boolean("loops", motion.loops)
     checks.number("frame_rate", motion.frame_rate, MIN_RATE, MAX_RATE)
     checks.number("standing_height", motion.standing_height, 1e-6, 1e3)
     checks.number("rest_height", motion.rest_height, 1e-3, 1e3)
-    if not 2 <= motion.frames <= MAX_FRAMES:
-        raise ValueError(f"frames: expected from 2 to {MAX_FRAMES}, got {motion.frames}")
+    _check_frames(motion.frames)
     frames = motion.frames
     joints = len(motion.joint_names)
     legs = len(motion.leg_names)
     for field, shape in array_shapes(frames, joints, legs).items():
         values = getattr(motion, field)
-        if values.shape != shape:
-            raise ValueError(f"{field}: expected numbers of shape {shape}, got {values.shape}")
+        _check_shape(field, values, shape)
         if not np.isfinite(values).all():
             raise ValueError(f"{field}: expected finite numbers in frame {_first_bad_frame(values)}")
         if abs(values).max(initial=0.0) > MAX_NUMBER:
@@ -161,6 +169,16 @@ def check_motion(motion: Motion) -> Motion:
     if motion.loops:
         _check_loop(motion)
     return motion
+
+
+def check_name(field: str, name: str) -> None:
+    """Check that a text can name a motion or a part of its body.
+
+    Raises:
+        ValueError: it is empty, too long, or not printable.
+    """
+    if not (isinstance(name, str) and name.isprintable() and 0 < len(name) <= MAX_NAME):
+        raise ValueError(f"{field}: expected printable names of 1 to {MAX_NAME} characters, got {checks.preview(name)}")
 
 
 def fits(motion: Motion, body: Body) -> bool:
@@ -271,11 +289,26 @@ def make_continuous(quaternions: np.ndarray) -> np.ndarray:
     is_valid = np.isfinite(lengths) & (lengths > 1e-9)
     if not is_valid.all():
         raise ValueError(f"quaternions: expected finite ones above 0 in frame {int(is_valid[:, 0].argmin())}")
+    return continue_signs(quaternions) / lengths
+
+
+def continue_signs(quaternions: np.ndarray) -> np.ndarray:
+    """Return the same orientations (frames, 4) with signs that do not jump, and w of the first not negative."""
     flips = (quaternions[1:] * quaternions[:-1]).sum(axis=-1) < 0.0
     signs = np.concatenate([[1.0], np.cumprod(np.where(flips, -1.0, 1.0))])
     if quaternions[0, 0] < 0.0:
         signs = -signs
-    return quaternions * signs[:, None] / lengths
+    return quaternions * signs[:, None]
+
+
+def _check_frames(frames: int) -> None:
+    if not 2 <= frames <= MAX_FRAMES:
+        raise ValueError(f"frames: expected from 2 to {MAX_FRAMES}, got {frames}")
+
+
+def _check_shape(field: str, values: np.ndarray, shape: tuple[int, ...]) -> None:
+    if values.shape != shape:
+        raise ValueError(f"{field}: expected numbers of shape {shape}, got {values.shape}")
 
 
 def _check_loop(motion: Motion) -> None:

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from arc_suite import archives, checks, files, parsers
-from arc_suite.motions.motion import Motion, check_motion
+from arc_suite.motions.motion import Motion, check_motion, check_name
 
 EXTENSION = ".npz"
 FORMAT = "arc_suite motion 1"  # another number for every change of what a file holds
 
 MAX_BYTES = 1 << 28  # bytes of all arrays
 _MAX_NAMES = 1024  # joints or legs
-_MAX_NAME = 200  # characters
+_MAX_FORMAT = 200  # characters of a format in an error
 
 TEXTS = ("name", "body")
 SCALARS = ("standing_height", "frame_rate", "rest_height")
@@ -26,10 +26,11 @@ def save(motion: Motion, path: str | os.PathLike[str]) -> None:
     """Write a motion.
 
     Raises:
-        ValueError: the file's extension is not `.npz`.
+        ValueError: the file's extension is not `.npz`, or `load` would refuse the motion.
         OSError: the file cannot be written.
     """
     checks.extension(path, (EXTENSION,))
+    check_motion(motion)
     with files.writing(path) as temporary, open(temporary, "wb") as file:
         np.savez(file, format=FORMAT, **_arrays(motion))
 
@@ -66,7 +67,7 @@ def _arrays(motion: Motion) -> dict[str, Any]:
 
 def _read(arrays: dict[str, np.ndarray]) -> Motion:
     """Return the motion of arrays by name; a damaged file raises anything."""
-    file_format = str(arrays.get("format", "no motion"))[:_MAX_NAME]
+    file_format = str(arrays.get("format", "no motion"))[:_MAX_FORMAT]
     if file_format != FORMAT:
         raise ValueError(f"expected {FORMAT!r}, got {file_format!r}")
     fields: dict[str, Any] = {}
@@ -94,8 +95,7 @@ def read_names(field: str, array: np.ndarray, dimensions: int) -> tuple[str, ...
         raise ValueError(f"{field}: expected up to {_MAX_NAMES} texts, got {array.shape} of {array.dtype}")
     names = tuple(array.ravel().tolist())
     for name in names:
-        if not name.isprintable() or not 0 < len(name) <= _MAX_NAME:
-            raise ValueError(f"{field}: expected printable names, got {checks.preview(name)}")
+        check_name(field, name)
     if len(set(names)) < len(names):
         raise ValueError(f"{field}: expected each name once")
     return names

@@ -29,13 +29,14 @@ def to_text(motion: Motion) -> str:
     """Return a motion as text, without loss.
 
     Raises:
-        ValueError: more frames than a text may have.
+        ValueError: more frames than a text may have, or `from_text` would refuse the motion.
     """
-    fields = motion._asdict()
+    fields = check_motion(motion)._asdict()
     shapes = array_shapes(motion.frames, len(motion.joint_names), len(motion.leg_names))
     arrays = [fields.pop(name) for name in shapes]
     numbers = np.concatenate([array.astype("<f8").ravel() for array in arrays])
     compressed = zlib.compress(numbers.tobytes(), 9)
+    fields |= {name: float(fields[name]) for name in SCALARS} | {"loops": bool(motion.loops)}  # also of NumPy's types
     fields |= {"frames": motion.frames, "numbers": base64.b64encode(compressed).decode()}
     text = json.dumps(fields)
     if len(text) > MAX_TEXT:
@@ -45,7 +46,7 @@ def to_text(motion: Motion) -> str:
 
 @functools.lru_cache(maxsize=32)
 def from_text(text: str) -> Motion:
-    """Return the motion of a text.
+    """Return the motion of a text. Its arrays are read-only, as the same motion is returned again.
 
     Raises:
         ValueError: a text that is too long or damaged.
@@ -114,7 +115,10 @@ def _read(fields: Mapping[str, Any]) -> Motion:
         raise ValueError(f"expected {num_bytes} bytes of numbers, got {len(content)}")
     numbers = np.split(np.frombuffer(content, "<f8").astype(float), np.cumsum(sizes)[:-1])
     arrays = {name: part.reshape(shapes[name]) for name, part in zip(shapes, numbers, strict=True)}
-    motion_fields: dict[str, Any] = {**texts, **names, **arrays, "planted": arrays["planted"] > 0.5}
+    arrays["planted"] = arrays["planted"] > 0.5
+    for array in arrays.values():
+        array.flags.writeable = False
+    motion_fields: dict[str, Any] = {**texts, **names, **arrays}
     for name in SCALARS:
         motion_fields[name] = checks.number(name, fields[name])
     return check_motion(Motion(loops=checks.boolean("loops", fields["loops"]), **motion_fields))

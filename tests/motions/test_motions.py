@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from arc_suite import motions, registry, rotations
 from arc_suite.models.posture import find_rest_pose
+from arc_suite.motions import motion_text
 
 TICK = registry.body_of("tick")
 QUEEN = registry.body_of("queen")
@@ -112,6 +114,70 @@ def test_velocities():
     np.testing.assert_allclose(
         np.linalg.norm(speeds.linear, axis=-1), np.linalg.norm(motion.positions[1, :2]) * 60.0, rtol=1e-3
     )
+
+
+LEVEL = np.tile((1.0, 0.0, 0.0, 0.0), (3, 1))
+NOT_OF_THE_BODY = {
+    "few joints": ({"angles": np.zeros((3, 17))}, "angles: expected numbers of shape (3, 18), got (3, 17)"),
+    "many joints": ({"angles": np.zeros((3, 19))}, "angles: expected numbers of shape (3, 18), got (3, 19)"),
+    "other frames": ({"angles": np.zeros((2, 18))}, "angles: expected numbers of shape (3, 18), got (2, 18)"),
+    "on the ground": ({"positions": np.zeros((3, 2))}, "positions: expected numbers of shape (3, 3), got (3, 2)"),
+    "a list": ({"positions": np.zeros(3)}, "positions: expected numbers of shape (3, 3), got (3,)"),
+    "a number": ({"positions": 0.0}, "positions: expected numbers of shape (3,), got ()"),
+    "fewer turns": ({"quaternions": LEVEL[:1]}, "quaternions: expected numbers of shape (3, 4), got (1, 4)"),
+    "no frames": (
+        {"positions": np.zeros((0, 3)), "quaternions": LEVEL[:0], "angles": np.zeros((0, 18))},
+        "frames: expected from 2 to 65536, got 0",
+    ),
+    "no name": ({"name": ""}, "name: expected printable names of 1 to 200 characters, got ''"),
+    "lines": ({"name": "a\nb"}, r"name: expected printable names of 1 to 200 characters, got 'a\nb'"),
+    "no text": ({"name": 3}, "name: expected printable names of 1 to 200 characters, got 3"),
+    "loops of a count": ({"loops": 1}, "loops: expected true or false, got 1"),
+}
+
+
+@pytest.mark.parametrize("kind", NOT_OF_THE_BODY)
+def test_make_refuses_what_is_no_motion_of_the_body(kind):
+    change, line = NOT_OF_THE_BODY[kind]
+    fields = {"name": "stand", "frame_rate": 60.0, "loops": False}
+    fields |= {"positions": np.zeros((3, 3)), "quaternions": LEVEL, "angles": np.zeros((3, 18))}
+    with refused(line):
+        motions.make(TICK, **fields | change)
+
+
+def test_a_name_has_at_most_200_characters(tmp_path):
+    motions.save(walk()._replace(name="x" * 200), tmp_path / "walk.npz")
+    assert motions.load(tmp_path / "walk.npz").name == "x" * 200
+    with refused("name: expected printable names of 1 to 200 characters, got 'xxx", begins=True):
+        motions.save(walk()._replace(name="x" * 201), tmp_path / "long.npz")
+
+
+@pytest.mark.parametrize("change", [{"name": ""}, {"loops": 1}, {"angles": np.zeros((41, 3))}])
+def test_what_no_file_may_hold_is_not_written(change, tmp_path):
+    motion = walk()._replace(**change)
+    for write in (lambda: motions.save(motion, tmp_path / "walk.npz"), lambda: motion_text.to_text(motion)):
+        with pytest.raises(ValueError, match=f"^{next(iter(change))}: expected "):
+            write()
+    assert not list(tmp_path.iterdir())
+
+
+def test_numbers_of_numpy_are_as_good_as_those_of_python():
+    motion = walk()
+    text = motion_text.to_text(motion)
+    height, rate = np.float64(motion.standing_height), np.float32(motion.frame_rate)
+    fields = {"loops": np.bool_(True), "standing_height": height, "frame_rate": rate}
+    assert motion_text.to_text(motion._replace(**fields)) == text
+    made = motions.make(TICK, "walk", np.int64(60), np.bool_(True), motion.positions, motion.quaternions, motion.angles)
+    assert made.loops is True and motion_text.to_text(made) == text
+
+
+def test_a_motion_of_a_text_cannot_be_changed():
+    text = motion_text.to_text(walk())
+    motion = motion_text.from_text(text)
+    for name in ("positions", "quaternions", "angles", "planted", "soles", "rest_soles"):
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(motion, name)[0] = 0
+    assert motions.digest(motion_text.from_text(text)) == motions.digest(walk())
 
 
 def test_mirror_is_its_own_inverse_and_mirrors_soles():
