@@ -4,9 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import rotations
+from arc_suite import checks, rotations
 from arc_suite.motions.ground_poses import compose, place_points, relative_pose
 from arc_suite.motions.motion import Motion
+
+_MIN_RATE = 1e-9  # Hz: any above 0
 
 
 class Velocities(NamedTuple):
@@ -32,7 +34,11 @@ def resample(motion: Motion, rate: float) -> Motion:
     Args:
         motion: the motion.
         rate: Hz.
+
+    Raises:
+        ValueError: a rate that is not above 0.
     """
+    checks.number("rate", rate, _MIN_RATE)
     frames = max(1, round(motion.seconds * rate)) + 1
     places = np.linspace(0.0, motion.frames - 1, frames)  # in frames of the motion
     longer = repeat(motion, -1, motion.frames + 1)
@@ -62,7 +68,11 @@ def repeat(motion: Motion, first: int, stop: int) -> Motion:
         motion: the motion.
         first: index of the first frame; it may be negative.
         stop: index of the frame behind the last.
+
+    Raises:
+        ValueError: no frame lies between them.
     """
+    checks.integer("stop", stop, first + 1)
     indices = np.arange(first, stop)
     last = motion.frames - 1
     if not motion.loops:
@@ -79,9 +89,19 @@ def repeat(motion: Motion, first: int, stop: int) -> Motion:
     start_of_soles = start[:, None] / (motion.standing_height, motion.standing_height, 1.0)
     return frames._replace(
         positions=place_points(start, frames.positions),
-        quaternions=rotations.turn_about_z(frames.quaternions, start[:, 2]),
+        quaternions=rotations.turn_about_z(frames.quaternions, start[:, 2]) * _signs_of_cycles(motion, cycles)[:, None],
         soles=place_points(start_of_soles, frames.soles),
     )
+
+
+def _signs_of_cycles(motion: Motion, cycles: np.ndarray) -> np.ndarray:
+    """Return the signs (n,) of quaternions in cycles (n,) of a loop, with which they do not jump between cycles.
+
+    They alternate if the torso turns over once in a cycle: then its quaternion comes back as the negative one.
+    """
+    first_of_next = rotations.turn_about_z(motion.quaternions[0], motion.displacement[2])
+    turns_over = first_of_next @ motion.quaternions[-1] < 0.0
+    return np.where(turns_over & (cycles % 2 == 1), -1.0, 1.0)
 
 
 def velocities(motion: Motion) -> Velocities:

@@ -103,6 +103,43 @@ def test_resampled_sine():
     np.testing.assert_allclose(motions.resample(motion, 60.0).angles, motion.angles, atol=1e-15)
 
 
+def turn_over(axis, cycles=1):
+    """A loop whose torso turns over once, about its axis, ahead (0) or to the left (1)."""
+    turns = 2.0 * np.pi * np.linspace(0.0, cycles, 60 * cycles + 1)
+    quaternions = np.zeros((len(turns), 4))
+    quaternions[:, 0] = np.cos(turns / 2)
+    quaternions[:, 1 + axis] = np.sin(turns / 2)
+    positions = np.tile((0.0, 0.0, 1.0), (len(turns), 1))
+    return motions.make(TICK, "roll", 60.0, True, positions, quaternions, np.zeros((len(turns), len(TICK.joint_names))))
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_loop_that_turns_over_goes_on(axis):
+    motion = turn_over(axis)
+    longer = motions.repeat(motion, -60, 181)
+    assert (longer.quaternions[1:] * longer.quaternions[:-1]).sum(axis=-1).min() > 0.99
+    np.testing.assert_array_equal(longer.quaternions[60:120], motion.quaternions[:-1])
+    np.testing.assert_allclose(longer.quaternions[60:181], turn_over(axis, 2).quaternions, atol=1e-12)
+    for rate in (120.0, 50.0):
+        copy = motions.resample(motion, rate)
+        halves = np.pi * np.linspace(0.0, 1.0, copy.frames)
+        expected = np.zeros((copy.frames, 4))
+        expected[:, 0] = np.cos(halves)
+        expected[:, 1 + axis] = np.sin(halves)
+        cosines = abs((copy.quaternions * expected).sum(axis=-1)).clip(0.0, 1.0)
+        assert np.degrees(2.0 * np.arccos(cosines)).max() < 0.01
+
+
+def test_no_frames_and_no_rate_are_one_line():
+    for stop in (0, -1):
+        for loops in (True, False):
+            with refused(f"stop: expected an integer from 1, got {stop}"):
+                motions.repeat(walk(loops=loops), 0, stop)
+    for rate in (0.0, -5.0):
+        with refused(f"rate: expected a finite number above 0, got {rate}"):
+            motions.resample(walk(), rate)
+
+
 def test_velocities():
     motion = walk(turn=0.7)
     speeds = motions.velocities(motion)

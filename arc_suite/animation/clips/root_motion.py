@@ -8,6 +8,7 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.animation.clips.recordings import Recording
 from arc_suite.motions.ground_poses import compose, ground_poses, relative_pose, twist_to
+from arc_suite.motions.motion import continue_signs
 from arc_suite.motions.sampling import sample_linearly
 
 _MIN_DIVISOR = 1e-9  # of values and paths that may be 0 throughout, and stay 0
@@ -278,17 +279,7 @@ def put_on_root(time_step: float, poses, root, torso_on_root) -> ClipMotion:
         time_step=time_step,
         root=root,
         positions=np.concatenate([torso_on_root[:, :2], poses[:, 2:3]], axis=-1),
-        quaternions=_make_continuous(rotations.turn_about_z(poses[:, 3:7], turn)),
+        quaternions=continue_signs(rotations.turn_about_z(poses[:, 3:7], turn)),
         joints=poses[:, 7:].copy(),
         twist=np.zeros(3),
     )
-
-
-def _make_continuous(quaternions) -> np.ndarray:
-    """Return the same orientations (samples, 4) with signs that do not jump, and w of the first not negative."""
-    flips = (quaternions[1:] * quaternions[:-1]).sum(axis=-1) < 0.0
-    signs = np.concatenate([[1.0], np.cumprod(np.where(flips, -1.0, 1.0))])
-    first_sign = np.sign(quaternions[0, 0])
-    if first_sign == 0.0:
-        first_sign = 1.0
-    return quaternions * first_sign * signs[:, None]
