@@ -18,7 +18,7 @@ from arc_suite.motions.ground_poses import (
     relative_pose,
     twist_to,
 )
-from arc_suite.motions.motion import Motion, find_rest
+from arc_suite.motions.motion import Motion, continue_signs, find_rest
 from arc_suite.motions.paths import Paths, Size, match_feet, scale_heights, shrink_turns, time_scale
 from arc_suite.motions.runs import find_runs
 from arc_suite.motions.sampling import sample_linearly
@@ -67,11 +67,15 @@ class _Root(NamedTuple):
 
 
 def count_cycles(motion: Motion) -> int:
-    """Return how many steps feet take in a loop, most of them; 0 for a motion without steps."""
+    """Return how many steps feet take in a loop, most of them; 0 for a motion without steps.
+
+    Where half of the feet step more often, it is the number of the other half.
+    """
     if not motion.loops:
         return 0
-    counts = np.array([len(_find_steps(planted).starts) for planted in motion.planted[:-1].T])
-    return int(np.median(counts[counts > 0])) if (counts > 0).sum() > 1 else 0
+    counts = sorted(len(_find_steps(planted).starts) for planted in motion.planted[:-1].T)
+    step_counts = [count for count in counts if count > 0]
+    return step_counts[(len(step_counts) - 1) // 2] if len(step_counts) > 1 else 0
 
 
 def find_gait(body: Body) -> gaits.Gait:
@@ -287,9 +291,8 @@ def _move_torso(
     heights = scale_heights(motion.positions[:, 2:] / motion.standing_height, motion.rest_height, rest_height)
     heights = rest_height + size.all * (heights - rest_height)
     local_positions = _sample(np.concatenate([size.ahead_left_up[:2] * ground, heights], axis=-1), shares)
-    local_quaternions = shrink_turns(
-        rotations.turn_about_z(motion.quaternions, -source_root.path[:, 2]), size.all * size.side
-    )
+    turns_on_root = rotations.turn_about_z(motion.quaternions, -source_root.path[:, 2])
+    local_quaternions = continue_signs(shrink_turns(turns_on_root, size.all * size.side))
     quaternions = _sample(local_quaternions, shares)
     quaternions /= np.linalg.norm(quaternions, axis=-1, keepdims=True)
     return place_points(root, local_positions), rotations.turn_about_z(quaternions, root[:, 2])

@@ -10,7 +10,7 @@ from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
 from arc_suite.models.standing import measure_standing, stability_margin
 from arc_suite.motions import gait_transfer, motion_text
-from arc_suite.motions.paths import match_feet
+from arc_suite.motions.paths import Size, match_feet
 
 QUEEN = registry.body_of("queen")
 SPIDER = registry.body_of("spider")
@@ -131,3 +131,43 @@ def test_feet_match_by_their_places():
     partners = match_feet(rest, motions.find_rest(SPIDER)[0])
     assert sorted(partner for partner in partners if partner is not None) == [0, 1, 2, 3, 4, 5]
     assert partners[0] == 0 and partners[3] == 2 and partners[4] == 3 and partners[7] == 5
+
+
+def step_with(body, counts):
+    """A loop in which each foot takes a number of steps."""
+    cycle = np.linspace(0.0, 1.0, 61)
+    planted = np.stack([cycle * count % 1.0 < 0.6 for count in counts], axis=-1)
+    planted[-1] = planted[0]
+    height = body.torso.standing_height
+    positions = np.stack([0.2 * cycle, 0.0 * cycle, np.full(61, height)], axis=-1)
+    level = np.tile((1.0, 0.0, 0.0, 0.0), (61, 1))
+    angles = np.zeros((61, len(body.joint_names)))
+    return motions.make(body, "odd", 60.0, True, positions, level, angles, planted)
+
+
+@pytest.mark.parametrize(
+    ("counts", "cycles"),
+    [((1, 1, 1, 3, 3, 3), 1), ((2, 2, 4, 4, 0, 0), 2), ((1, 1, 1, 1, 3, 3), 1), ((1, 3, 3, 3, 3, 3), 3)],
+)
+def test_feet_that_step_more_often_than_others(counts, cycles):
+    bastion = registry.body_of("bastion")
+    steps = step_with(bastion, counts)
+    assert gait_transfer.count_cycles(steps) == cycles
+    motion, notes = motions.retarget(steps, registry.body_of("tick"))
+    assert notes[0].startswith(f"gait: {cycles} cycles with a duty factor of 0.60, before 0.60; ")
+    assert motion.seconds > 0.0 and np.isfinite(motion.angles).all()
+    partners = match_feet(steps.rest_soles, motion.rest_soles)
+    for leg, foot in enumerate(partners):
+        starts = gait_transfer._find_steps(motion.planted[:-1, leg]).starts
+        assert len(starts) == counts[foot]
+
+
+def test_a_torso_that_turns_over_in_steps_turns_evenly():
+    steps = step_with(registry.body_of("bastion"), (1, 1, 1, 1, 1, 1))
+    halves = np.pi * np.linspace(0.0, 1.0, 61)
+    quaternions = np.stack([np.cos(halves), np.sin(halves), 0.0 * halves, 0.0 * halves], axis=-1)
+    paths, _ = gait_transfer.transfer(steps._replace(quaternions=quaternions), QUEEN, Size())
+    assert len(paths.quaternions) > steps.frames  # frames lie between those of the motion
+    cosines = abs((paths.quaternions[1:] * paths.quaternions[:-1]).sum(axis=-1)).clip(0.0, 1.0)
+    turns = np.degrees(2.0 * np.arccos(cosines))
+    np.testing.assert_allclose(turns, 360.0 / len(turns), rtol=0.05)
