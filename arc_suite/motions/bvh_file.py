@@ -20,6 +20,7 @@ _MAX_BYTES = 1 << 25
 _MAX_JOINTS = 1024
 _MAX_DEPTH = 256
 _AXES = {"X": 0, "Y": 1, "Z": 2}
+_MOTION = "MOTION"  # word behind the tree, before frames
 
 
 class _Joint(NamedTuple):
@@ -47,11 +48,11 @@ def read(path: str | os.PathLike[str]) -> Skeleton:
     """
     text = files.read_utf8(path, _MAX_BYTES)
     with parsers.guard(f"{path}"):
-        hierarchy, separator, frames = text.partition("MOTION")
-        if not separator:
+        words = text.split()
+        if _MOTION not in words:
             raise ValueError("expected HIERARCHY and MOTION of a BVH file")
-        joints = _read_joints(hierarchy.split())
-        rate, numbers = _read_frames(frames, sum(len(joint.channels) for joint in joints))
+        joints, words_of_frames = _read_joints(words)
+        rate, numbers = _read_frames(words_of_frames, sum(len(joint.channels) for joint in joints))
         stem = Path(path).stem
         positions, turns = _pose(joints, numbers)
     bind_positions = np.zeros((len(joints), 3))
@@ -69,13 +70,13 @@ def read(path: str | os.PathLike[str]) -> Skeleton:
     )
 
 
-def _read_joints(words: list[str]) -> list[_Joint]:
-    """Return the joints of a tree; those above come first, and ends are left out."""
+def _read_joints(words: list[str]) -> tuple[list[_Joint], list[str]]:
+    """Return the joints of a tree, those above first and without ends, and the words behind it and behind MOTION."""
     joints: list[_Joint] = []
     open_joints: list[int] = []  # indices of joints whose braces are open; -1 for an end
     pending: int | None = None  # the joint or end whose brace comes next
     index = 1 if words[:1] == ["HIERARCHY"] else 0
-    while index < len(words):
+    while index < len(words) and words[index] != _MOTION:  # a bone may have this name, too
         word = words[index]
         if word in ("ROOT", "JOINT"):
             above = open_joints[-1] if open_joints else -1
@@ -109,12 +110,11 @@ def _read_joints(words: list[str]) -> list[_Joint]:
             raise ValueError(f"expected at most {_MAX_JOINTS} joints, and {_MAX_DEPTH} within each other")
     if not joints:
         raise ValueError("expected joints, and there are none")
-    return joints
+    return joints, words[index + 1 :]
 
 
-def _read_frames(text: str, channels: int) -> tuple[float, np.ndarray]:
+def _read_frames(words: list[str], channels: int) -> tuple[float, np.ndarray]:
     """Return the frame rate, Hz, and the numbers (frames, channels)."""
-    words = text.split()
     if words[0] != "Frames:" or words[2:4] != ["Frame", "Time:"]:
         raise ValueError("expected Frames: and Frame Time: after MOTION")
     frames = checks.integer("Frames", int(words[1][:12]), 2, MAX_FRAMES)

@@ -81,11 +81,10 @@ def read(path: str | os.PathLike[str], clip: str | None = None) -> Skeleton:
             raise ValueError(f"nodes: expected at most {_MAX_NODES}, got {len(nodes)}")
         parents = _find_parents(nodes)
         animation = _choose_animation(_list(file.json, "animations"), clip)
-        name = str(animation["name"])
         seconds, poses = _sample(file, nodes, animation)
         world_poses = _world_poses(poses, parents)
         joints, bind_poses = _bind_poses(file, nodes, parents)
-        return _make_skeleton(name, seconds, nodes, joints, bind_poses, world_poses[:, joints], animation)
+        return _make_skeleton(animation["name"], seconds, nodes, joints, bind_poses, world_poses[:, joints])
 
 
 def _open(data: bytes) -> _File:
@@ -155,22 +154,25 @@ def _choose_animation(animations: list[dict], clip: str | None) -> dict:
     """Return the animation of a clip, by its name or by that without `_loop`.
 
     Raises:
-        ValueError: there is none, or several and no name.
+        ValueError: there is none, or several of this name, or several and no name.
     """
     if len(animations) > _MAX_ANIMATIONS:
         raise ValueError(f"animations: expected at most {_MAX_ANIMATIONS}, got {len(animations)}")
+    by_name: dict[str, list[dict]] = {}
     for index, animation in enumerate(animations):
-        animation.setdefault("name", f"animation {index}")
-    by_name = {str(animation["name"]): animation for animation in animations}
+        animation["name"] = str(animation.get("name") or f"animation {index}")
+        by_name.setdefault(animation["name"], []).append(animation)
     if not by_name:
         raise ValueError("expected an animation, and there is none")
-    if clip is None:
-        if len(by_name) > 1:
-            raise ValueError(f"clip: expected one of {', '.join(by_name)[:500]}")
-        (animation,) = by_name.values()
-        return animation
-    name = clip if clip in by_name else f"{clip}{LOOP_SUFFIX}"
-    return by_name[name] if name in by_name else by_name[checks.name(clip, by_name, "clip")]
+    if clip is None and len(by_name) > 1:
+        raise ValueError(f"clip: expected one of {', '.join(by_name)[:500]}")
+    name = next(iter(by_name)) if clip is None else clip
+    if f"{name}{LOOP_SUFFIX}" in by_name and name not in by_name:
+        name = f"{name}{LOOP_SUFFIX}"
+    namesakes = by_name[checks.name(name, by_name, "clip")]
+    if len(namesakes) > 1:
+        raise ValueError(f"clip: expected one animation {checks.preview(name)}, got {len(namesakes)}; rename them")
+    return namesakes[0]
 
 
 # Poses of nodes.
@@ -368,13 +370,8 @@ def _make_skeleton(
     joints: list[int],
     bind_poses: np.ndarray,
     poses: np.ndarray,
-    animation: dict,
 ) -> Skeleton:
     """Return the skeleton of world transforms (frames, joints, 4, 4), in the axes of the suite."""
-    extras = animation.get("extras")
-    loops = name.endswith(LOOP_SUFFIX)
-    if isinstance(extras, dict) and isinstance(extras.get("loops"), bool):
-        loops = extras["loops"]
     turns = poses[..., :3, :3] @ np.linalg.inv(bind_poses[:, :3, :3])
     scales = np.cbrt(np.linalg.det(turns))
     if not (np.isfinite(scales) & (scales > 1e-9)).all():
@@ -382,7 +379,7 @@ def _make_skeleton(
     return Skeleton(
         name=clip_of_animation(name),
         frame_rate=(len(poses) - 1) / seconds if seconds > 0.0 else FRAME_RATE,
-        loops=loops,
+        loops=name.endswith(LOOP_SUFFIX),
         bones=tuple([str(nodes[joint].get("name", "")) for joint in joints]),
         bind_positions=bind_poses[:, :3, 3] @ FROM_Y_UP.T,
         positions=poses[..., :3, 3] @ FROM_Y_UP.T,

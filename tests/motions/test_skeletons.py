@@ -192,3 +192,34 @@ def test_several_animations_need_a_name(raised, tmp_path):
         read(tmp_path, data, clip="run")
     motion, _ = read(tmp_path, data, clip="walk")
     assert motion.loops and motion.name == "walk"
+
+
+@pytest.mark.parametrize(("name", "loops", "read_name"), [("nod_loop", True, "nod"), ("nod", False, "nod")])
+def test_the_name_of_an_animation_says_whether_it_repeats(name, loops, read_name, file, tmp_path):
+    """Also where what else the file says of the animation was written under another name."""
+    for extra in (True, False):
+        editor = gltf_editor.Editor(file)
+        editor.json["animations"][0]["name"] = name
+        editor.json["animations"][0]["extras"]["loops"] = extra
+        motion, _ = read(tmp_path, editor.data())
+        assert (motion.loops, motion.name) == (loops, read_name)
+
+
+def test_an_animation_without_a_name_has_its_number(raised, file, tmp_path):
+    editor = gltf_editor.Editor(file)
+    editor.json["animations"][0]["name"] = ""
+    motion, _ = read(tmp_path, editor.data())
+    assert motion.name == "animation 0"
+    motions.save(motion, tmp_path / "raise.npz")
+    assert motions.digest(motions.load(tmp_path / "raise.npz")) == motions.digest(motion)
+
+
+def test_two_animations_of_one_name_are_one_line(raised, tmp_path):
+    steps = drawn_motions.step_loop(TICK)
+    clips = [drawn_motions.clip_of(TICK, motion) for motion in (raised, steps, raised)]
+    data = glb(TICK, clips, root_motion="moving")
+    with pytest.raises(ValueError, match="clip: expected one animation 'raise', got 2; rename them"):
+        read(tmp_path, data, clip="raise")
+    assert read(tmp_path, data, clip="walk")[0].loops
+    with pytest.raises(ValueError, match="clip: expected one animation 'raise', got 2; rename them"):
+        read(tmp_path, glb(TICK, clips[::2], root_motion="moving"))
