@@ -31,7 +31,7 @@ class Options(NamedTuple):
     Attributes:
         clip: name of an animation of a file with several.
         loop: whether the motion repeats; None for what the file says, or else no loop.
-        fps: frames a second of a table.
+        fps: frames a second of a table that does not say them.
     """
 
     clip: str | None = None
@@ -76,11 +76,16 @@ def read(
         options: what the file does not say.
 
     Raises:
-        ValueError: an unknown kind of file, a damaged file, or one of another body; one line.
+        ValueError: an unknown kind of file, a damaged file, one of another body, or an option without effect; one line.
         OSError: the file cannot be read.
     """
     extension = check_extension(path)
-    if holds_motion(path):
+    is_motion = holds_motion(path)
+    for name, value in options._asdict().items():
+        if value is not None and (is_motion or extension not in OPTIONS[name]):
+            kind = "a motion" if is_motion else f"a {extension}"
+            raise ValueError(f"{path}: {name}: it has no effect on {kind}; leave it out")
+    if is_motion:
         return motion_files.load(path), []
     if body is None:
         raise ValueError(f"{path}: expected the body that moves")
@@ -101,13 +106,13 @@ def _read_skeleton(path: str | os.PathLike[str], body: Body, options: Options) -
 
 
 def _read_csv(path: str | os.PathLike[str], body: Body, options: Options) -> tuple[Motion, list[str]]:
-    return tables.read_csv(path, body, options.fps, bool(options.loop)), []
+    return tables.read_csv(path, body, options.fps, bool(options.loop))
 
 
 def _read_arrays(path: str | os.PathLike[str], body: Body, options: Options) -> tuple[Motion, list[str]]:
     with parsers.guard(f"{path}"):
         arrays = archives.read(path, motion_files.MAX_BYTES)
-    return tables.read_arrays(path, arrays, body, options.fps, bool(options.loop)), []
+    return tables.read_arrays(path, arrays, body, options.fps, bool(options.loop))
 
 
 _READERS: dict[str, Callable[[str | os.PathLike[str], Body, Options], tuple[Motion, list[str]]]] = {

@@ -27,6 +27,7 @@ _MAX_LENGTH_ERROR = 0.02  # standing heights, of a bone that belongs to the body
 _MAX_SCALE_ERROR = 0.01  # of a file whose unit is a meter
 _MAX_BIND_MISS = 0.02  # standing heights, of a bone in the bound pose
 _MIN_NAMED_MISS = 0.05  # degrees, or hundredths of a standing height
+_MIN_NAMED_SEAM = 0.1  # the same, of a loop
 
 # The search for the bound pose; see `_minimize`.
 _ITERATIONS = 60
@@ -137,9 +138,8 @@ def fit_skeleton(body: Body, skeleton: Skeleton) -> tuple[Motion, list[str]]:
     positions = bones.positions[:, 0]
     quaternions = rotations.from_matrix(torso_turns)
     if skeleton.loops:
-        positions, quaternions, angles, seam = close_loop(positions, quaternions, angles)
-        if seam > np.radians(0.1):
-            notes.append(f"the loop was open by {np.degrees(seam):.2g} degrees, which its end takes up")
+        positions, quaternions, angles, notes_of_loop = close_loop(body, positions, quaternions, angles)
+        notes += notes_of_loop
     motion = make(body, skeleton.name, skeleton.frame_rate, skeleton.loops, positions, quaternions, angles)
     return motion, notes
 
@@ -218,11 +218,17 @@ def _turn(skeleton: Skeleton, rotation: np.ndarray) -> Skeleton:
 
 
 def close_loop(
-    positions: np.ndarray, quaternions: np.ndarray, angles: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Return a loop whose last frame is its first one, moved over the ground, and how far it was open, rad.
+    body: Body, positions: np.ndarray, quaternions: np.ndarray, angles: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
+    """Return a loop whose last frame is its first one, moved over the ground, and lines that say how far it was open.
 
     The last quarter of the loop takes up the difference. A loop that is open by more than `MAX_SEAM` stays open.
+
+    Args:
+        body: the body that moves.
+        positions: (frames, 3) of the torso, m.
+        quaternions: (frames, 4) of the torso.
+        angles: (frames, joints) rad.
     """
     quaternions = make_continuous(quaternions)
     turn = rotations.yaw(quaternions[-1]) - rotations.yaw(quaternions[0])
@@ -231,15 +237,26 @@ def close_loop(
         last_quaternion = -last_quaternion
     angle_difference = angles[0] - angles[-1]
     quaternion_difference = last_quaternion - quaternions[-1]
+    height_difference = positions[0, 2] - positions[-1, 2]
     seam = float(max(abs(angle_difference).max(initial=0.0), 2.0 * np.linalg.norm(quaternion_difference)))
-    if seam > MAX_SEAM:
-        return positions, quaternions, angles, 0.0
+    height_seam = float(abs(height_difference) / body.torso.standing_height)
+    if max(seam, height_seam) > MAX_SEAM:
+        return positions, quaternions, angles, []
     share = (np.linspace(-3.0, 1.0, len(angles)).clip(0.0))[:, None]
     weights = share**2 * (3.0 - 2.0 * share)
-    height_difference = positions[0, 2] - positions[-1, 2]
     positions = positions + weights * (0.0, 0.0, height_difference)
     quaternions = quaternions + weights * quaternion_difference
-    return positions, quaternions, angles + weights * angle_difference, seam
+    return positions, quaternions, angles + weights * angle_difference, _note_seams(seam, height_seam)
+
+
+def _note_seams(seam: float, height_seam: float) -> list[str]:
+    """Return a line for a loop that was open by a turn, rad, and one for a height of the torso, standing heights."""
+    notes = []
+    if seam > np.radians(_MIN_NAMED_SEAM):
+        notes.append(f"the loop was open by {np.degrees(seam):.2g} degrees, which its end takes up")
+    if height_seam > 0.01 * _MIN_NAMED_SEAM:
+        notes.append(f"the loop was open by {height_seam:.2g} standing heights of the torso, which its end takes up")
+    return notes
 
 
 def _find_bones(body: Body, bones: tuple[str, ...]) -> list[int]:

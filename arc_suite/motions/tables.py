@@ -11,7 +11,7 @@ import numpy as np
 
 from arc_suite import checks, files, parsers, rotations
 from arc_suite.models import source
-from arc_suite.motions.motion import MAX_FRAMES, Motion, make, make_continuous
+from arc_suite.motions.motion import MAX_FRAMES, Motion, continue_signs, make, make_continuous
 from arc_suite.motions.skeletons import CURE, close_loop
 from arc_suite.robots.spec import Body
 
@@ -30,8 +30,8 @@ _POSITIONS_ARRAY = "body_pos_w"
 _QUATERNIONS_ARRAY = "body_quat_w"
 
 
-def read_csv(path: str | os.PathLike[str], body: Body, rate: float | None, loops: bool) -> Motion:
-    """Read a table of frames.
+def read_csv(path: str | os.PathLike[str], body: Body, rate: float | None, loops: bool) -> tuple[Motion, list[str]]:
+    """Read a table of frames, and return it with a line for each thing that was changed.
 
     Columns are `x`, `y`, `z`, `qw`, `qx`, `qy`, `qz` of the root and the joints' names; with `time`, s, also at an
     uneven rate. Without a line of names the columns are x, y, z, qx, qy, qz, qw and the joints in the body's order.
@@ -43,24 +43,28 @@ def read_csv(path: str | os.PathLike[str], body: Body, rate: float | None, loops
         loops: whether the motion repeats.
 
     Raises:
-        ValueError: a damaged file, or columns of another body; one line.
+        ValueError: a damaged file, columns of another body, or a rate besides that of the file; one line.
         OSError: the file cannot be read.
     """
     text = files.read_utf8(path, _MAX_BYTES)
     with parsers.guard(f"{path}"):
         columns = _read_columns(text, body)
-        if _TIME in columns:
-            rate, columns = _even_rate(columns)
-        return _make(path, body, rate, loops, columns)
+        times = columns.pop(_TIME, None)
+        table = _stack_columns(body, columns)
+        if times is None:
+            return _make(path, body, _choose_rate(rate, None), loops, table)
+        return _make(path, body, _choose_rate(rate, _measure_rate(times)), loops, _sample_evenly(times, table))
 
 
 def read_arrays(
     path: str | os.PathLike[str], arrays: dict[str, np.ndarray], body: Body, rate: float | None, loops: bool
-) -> Motion:
-    """Return the motion of arrays by name: `fps`, `joint_pos`, `joint_names`, `body_pos_w` and `body_quat_w`.
+) -> tuple[Motion, list[str]]:
+    """Return the motion of arrays by name, and a line for each thing that was changed; see `read_csv`.
+
+    The arrays are `joint_pos`, `body_pos_w` and `body_quat_w`, with `fps` and `joint_names` where the file says them.
 
     Raises:
-        ValueError: arrays are missing, or do not fit the body.
+        ValueError: arrays are missing, or do not fit the body, or a rate besides that of the file.
     """
     with parsers.guard(f"{path}"):
         names = body.joint_names
@@ -77,12 +81,14 @@ def read_arrays(
         quaternions = _numbers(arrays, _QUATERNIONS_ARRAY, 3)[:, 0]
         if positions.shape != (len(angles), 3) or quaternions.shape != (len(angles), 4):
             raise ValueError(f"expected {len(angles)} positions and quaternions of the root, w first")
-        if rate is None and _RATE_ARRAY in arrays:
-            rate = checks.number(_RATE_ARRAY, np.asarray(arrays[_RATE_ARRAY], float).ravel()[0].item(), 1.0)
+        file_rate = None
+        if _RATE_ARRAY in arrays:
+            file_rate = checks.number(_RATE_ARRAY, np.asarray(arrays[_RATE_ARRAY], float).ravel()[0].item(), 1.0)
         columns = dict(zip(_POSITION, positions.T, strict=True))
         columns |= zip(_QUATERNION, quaternions.T, strict=True)
         columns |= zip(names, angles.T, strict=True)
-        return _make(path, body, rate, loops, columns)
+        table = _stack_columns(body, columns)
+        return _make(path, body, _choose_rate(rate, file_rate), loops, table)
 
 
 def _read_columns(text: str, body: Body) -> dict[str, np.ndarray]:
@@ -108,26 +114,39 @@ def _read_columns(text: str, body: Body) -> dict[str, np.ndarray]:
     return columns
 
 
-def _make(
-    path: str | os.PathLike[str], body: Body, rate: float | None, loops: bool, columns: dict[str, np.ndarray]
-) -> Motion:
-    """Return the motion of columns (frames,) by name."""
+def _stack_columns(body: Body, columns: dict[str, np.ndarray]) -> np.ndarray:
+    """Return columns (frames,) by name as a table (frames, 3 + 4 + joints): position, quaternion and joints."""
     expected_names = (*_POSITION, *_QUATERNION, *body.joint_names)
     _check_names(body, columns, expected_names)
-    if rate is None:
-        raise ValueError("fps: expected frames a second, as the file does not say them")
     table = np.stack([columns[name] for name in expected_names], axis=-1)
     if not np.isfinite(table).all():
         frame = int(np.isfinite(table).all(axis=-1).argmin())
         raise ValueError(f"expected finite numbers in frame {frame}")
+    return table
+
+
+def _choose_rate(rate: float | None, file_rate: float | None) -> float:
+    """Return the one rate, Hz, that is given: by the caller or by the file."""
+    if rate is None and file_rate is None:
+        raise ValueError("fps: expected frames a second, as the file does not say them")
+    if rate is not None and file_rate is not None:
+        raise ValueError(f"fps: the file says {file_rate:g} frames a second; leave fps out")
+    return file_rate if rate is None else rate
+
+
+def _make(
+    path: str | os.PathLike[str], body: Body, rate: float, loops: bool, table: np.ndarray
+) -> tuple[Motion, list[str]]:
+    """Return the motion of a table at a rate, Hz, and a line for each thing that was changed; see `_stack_columns`."""
     positions = table[:, :3]
     quaternions = make_continuous(table[:, 3:7])
     angles = table[:, 7:]
     if body.source:
         positions, quaternions, angles = _count_from_standing_pose(body, positions, quaternions, angles)
+    notes = []
     if loops:
-        positions, quaternions, angles, _ = close_loop(positions, quaternions, angles)
-    return make(body, Path(path).stem, rate, loops, positions, quaternions, angles)
+        positions, quaternions, angles, notes = close_loop(body, positions, quaternions, angles)
+    return make(body, Path(path).stem, rate, loops, positions, quaternions, angles), notes
 
 
 def _check_names(body: Body, columns: Collection[str], expected_names: Sequence[str]) -> None:
@@ -161,16 +180,19 @@ def _count_from_standing_pose(
     return positions + offsets, torso_quaternions, angles - home_angles
 
 
-def _even_rate(columns: dict[str, np.ndarray]) -> tuple[float, dict[str, np.ndarray]]:
-    """Return the rate of a table with times, Hz, and its other columns at that rate."""
-    times = columns[_TIME]
+def _measure_rate(times: np.ndarray) -> float:
+    """Return the mean rate of frames at times (frames,), s, in Hz."""
     if not (np.isfinite(times).all() and (np.diff(times) > 0.0).all()):
         raise ValueError(f"{_TIME}: expected numbers that grow")
-    frames = len(times)
-    rate = (frames - 1) / (times[-1] - times[0])
-    even_times = np.linspace(times[0], times[-1], frames)
-    even_columns = {name: np.interp(even_times, times, column) for name, column in columns.items() if name != _TIME}
-    return float(rate), even_columns
+    return float((len(times) - 1) / (times[-1] - times[0]))
+
+
+def _sample_evenly(times: np.ndarray, table: np.ndarray) -> np.ndarray:
+    """Return a table with frames at times (frames,), s, as one with as many frames at an even rate."""
+    positions, quaternions, angles = np.split(table, (3, 7), axis=1)
+    table = np.concatenate([positions, continue_signs(quaternions), angles], axis=1)
+    even_times = np.linspace(times[0], times[-1], len(times))
+    return np.stack([np.interp(even_times, times, column) for column in table.T], axis=-1)
 
 
 def _read_line(line: str, columns: int, number: int) -> list[float]:

@@ -4,8 +4,10 @@ import drawn_motions
 import imports
 import numpy as np
 import pytest
+from refusals import refused
 
-from arc_suite import motions, registry
+from arc_suite import motions, registry, rotations
+from arc_suite.animation.clips.creatures import glb
 from arc_suite.models.standing import compile_body, standing_qpos
 from arc_suite.motions import reading, skeletons
 from arc_suite.tasks import readings
@@ -54,6 +56,76 @@ def test_damaged_bvh_is_one_line(old, raised, tmp_path):
     with pytest.raises(ValueError, match=message) as error:
         reading.read(path, TICK)
     assert str(error.value).startswith(f"{path}: ") and "\n" not in str(error.value)
+
+
+def test_a_bone_may_be_called_motion(raised, tmp_path):
+    path = tmp_path / "raise.bvh"
+    end = TICK.part_names[-1]
+    text = drawn_motions.to_bvh(TICK, raised)
+    extra = "JOINT {0}\n{{ OFFSET 0 0 0 CHANNELS 0 JOINT {1} {{ OFFSET 0 0 0 CHANNELS 0 }} }}\n"
+    for names in (("LOCOMOTION", "MOTION_2"), ("MOTION", "ROOT_MOTION")):
+        old = f"JOINT {end}\n"
+        assert text.count(old) == 1
+        path.write_text(text.replace(old, extra.format(*names) + old))
+        motion, notes = reading.read(path, TICK)
+        assert notes == []
+        np.testing.assert_allclose(motion.angles, raised.angles, atol=NEAR)
+
+
+# Loops.
+
+
+def rise(height):
+    """A body that stands in a loop while its torso rises, by standing heights, and an end that is open by as much."""
+    frames = 41
+    level = np.tile((1.0, 0.0, 0.0, 0.0), (frames, 1))
+    rising = np.linspace(1.0, 1.0 + height, frames)[:, None] * (0.0, 0.0, TICK.torso.standing_height)
+    return motions.make(TICK, "rise", 20.0, False, rising, level, np.zeros((frames, len(TICK.joint_names))))
+
+
+def write_arrays(path, motion):
+    np.savez(
+        path,
+        fps=motion.frame_rate,
+        joint_pos=motion.angles,
+        body_pos_w=motion.positions[:, None],
+        body_quat_w=motion.quaternions[:, None],
+    )
+
+
+WRITERS = {
+    "csv": lambda path, motion: path.write_text(drawn_motions.to_csv(TICK, motion)),
+    "bvh": lambda path, motion: path.write_text(drawn_motions.to_bvh(TICK, motion)),
+    "glb": lambda path, motion: path.write_bytes(
+        glb(TICK, [drawn_motions.clip_of(TICK, motion)], root_motion="moving")
+    ),
+    "npz": write_arrays,
+}
+
+
+@pytest.mark.parametrize("extension", WRITERS)
+def test_a_loop_whose_height_is_open_is_one_line(extension, tmp_path):
+    path = tmp_path / f"rise.{extension}"
+    options = reading.Options(loop=True, fps=20.0 if extension == "csv" else None)
+    WRITERS[extension](path, rise(0.5))
+    with pytest.raises(ValueError, match="loops: expected the last frame to be .*, its height by 0.5 standing heights"):
+        reading.read(path, TICK, options)
+    WRITERS[extension](path, rise(0.02))
+    motion, notes = reading.read(path, TICK, options)
+    assert notes == ["the loop was open by 0.02 standing heights of the torso, which its end takes up"]
+    heights = motion.positions[:, 2] / TICK.torso.standing_height
+    np.testing.assert_allclose(heights[[0, -1]], 1.0, atol=NEAR)
+    assert heights.max() == pytest.approx(1.015, abs=1e-3)
+
+
+def test_a_table_says_how_far_its_loop_was_open(tmp_path):
+    path = tmp_path / "walk.csv"
+    steps = drawn_motions.step_loop(TICK)
+    angles = steps.angles + np.linspace(0.0, 0.03, steps.frames)[:, None]
+    path.write_text(drawn_motions.to_csv(TICK, steps._replace(angles=angles)))
+    motion, notes = reading.read(path, TICK, reading.Options(fps=20.0, loop=True))
+    assert notes == ["the loop was open by 1.7 degrees, which its end takes up"]
+    np.testing.assert_allclose(motion.angles[-1], motion.angles[0], atol=NEAR)
 
 
 # Tables.
@@ -149,6 +221,54 @@ def test_damaged_table_is_one_line(index, tmp_path):
     with pytest.raises(ValueError, match=message) as error:
         reading.read(path, TICK, reading.Options(fps=30.0))
     assert str(error.value).startswith(f"{path}: ") and "\n" not in str(error.value)
+
+
+def test_signs_of_quaternions_do_not_matter_at_uneven_times(tmp_path):
+    """q and -q are one orientation; a line between them passes through 0."""
+    times = np.array((0.0, 0.1, 0.25, 0.3, 0.45, 0.5))
+    turns = np.linspace(0.0, 0.5, 6)
+    table = np.zeros((6, 7))
+    table[:, 2] = 0.2
+    table[:, 3] = np.cos(turns / 2)
+    table[:, 6] = np.sin(turns / 2)
+    copies = []
+    for signs in (np.ones(6), np.array((1, 1, -1, -1, 1, 1)), -np.ones(6)):
+        table[:, 3:] *= signs[:, None]
+        rows = np.concatenate([times[:, None], table, np.zeros((6, len(TICK.joint_names)))], axis=-1)
+        path = tmp_path / "turn.csv"
+        path.write_text("\n".join([f"time,{GOOD}", *[",".join(map(repr, row)) for row in rows.tolist()]]))
+        copies.append(reading.read(path, TICK)[0])
+    expected = np.interp(np.linspace(0.0, 0.5, 6), times, turns)
+    np.testing.assert_allclose(rotations.yaw(copies[0].quaternions), expected, atol=1e-4)
+    for copy in copies[1:]:
+        np.testing.assert_array_equal(copy.quaternions, copies[0].quaternions)
+
+
+def test_a_rate_beside_that_of_the_file_is_one_line(raised, tmp_path):
+    path = tmp_path / "raise.csv"
+    lines = drawn_motions.to_csv(TICK, raised).splitlines()
+    path.write_text(
+        "\n".join([f"time,{lines[0]}", *[f"{0.05 * frame},{line}" for frame, line in enumerate(lines[1:])]])
+    )
+    write_arrays(tmp_path / "raise.npz", raised)
+    for name in ("raise.csv", "raise.npz"):
+        assert reading.read(tmp_path / name, TICK)[0].frame_rate == pytest.approx(20.0)
+        with refused(f"{tmp_path / name}: fps: the file says 20 frames a second; leave fps out"):
+            reading.read(tmp_path / name, TICK, reading.Options(fps=100.0))
+
+
+def test_an_option_without_effect_is_one_line(raised, tmp_path):
+    motions.save(raised, tmp_path / "raise.npz")
+    (tmp_path / "raise.bvh").write_text(drawn_motions.to_bvh(TICK, raised))
+    for name, kind, options in (
+        ("raise.npz", "a motion", {"loop": True}),
+        ("raise.npz", "a motion", {"fps": 30.0}),
+        ("raise.bvh", "a .bvh", {"fps": 30.0}),
+        ("raise.bvh", "a .bvh", {"clip": "raise"}),
+    ):
+        (option,) = options
+        with refused(f"{tmp_path / name}: {option}: it has no effect on {kind}; leave it out"):
+            reading.read(tmp_path / name, TICK, reading.Options(**options))
 
 
 def test_files_of_other_kinds_and_bodies(raised, tmp_path):
