@@ -28,7 +28,8 @@ def of_setup(setup: Setup) -> dict[str, Any]:
 
 def policy_sha256(policy: str) -> str | None:
     """Return the hash of a policy's files; None for one without files, such as a demonstrator."""
-    has_files = policies.is_file(policy) or policy.endswith(".npz") or policies.function_file(policy) is not None
+    is_file = policies.is_file(policy) or policy.lower().endswith(".npz")
+    has_files = is_file or policies.function_file(policy) is not None
     return policies.digest(policy) if has_files else None
 
 

@@ -87,7 +87,7 @@ def names_file(words: Any) -> bool:
         return any(map(names_file, words))
     if isinstance(words, os.PathLike):
         return True
-    return isinstance(words, str) and words.endswith(EXTENSION) and not is_text(words)
+    return isinstance(words, str) and words.lower().endswith(EXTENSION) and not is_text(words)
 
 
 def label(words: Any) -> Any:

@@ -44,7 +44,7 @@ def refuse_other_files(name: str | os.PathLike[str]) -> None:
         _refuse_file_of_python(path)
     elif extension in _HINTS:
         raise ValueError(f"policy {checks.preview(os.fspath(name))}: {_HINTS[extension]}")
-    elif path.suffix and path.suffix != network.EXTENSION and path.is_file():
+    elif extension not in ("", network.EXTENSION) and path.is_file():
         if other_libraries.find(name) is None:
             raise ValueError(f"policy {checks.preview(os.fspath(name))}: it is no policy; expected the folder of a run")
     else:

@@ -396,7 +396,7 @@ def _find_source(name: str | os.PathLike[str]) -> PolicyFile | NetworkPath | Fun
     if policy_file is not None:
         return policy_file
     network_path = NetworkPath(Path(text))
-    if isinstance(name, os.PathLike) or text.endswith(network.EXTENSION) or network_path.has_networks():
+    if isinstance(name, os.PathLike) or text.lower().endswith(network.EXTENSION) or network_path.has_networks():
         return network_path
     if ":" in text:
         return FunctionName(text)

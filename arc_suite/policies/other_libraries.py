@@ -4,6 +4,7 @@ A name is that of a file, or `FILE+FURTHER` with a further file that belongs to 
 """
 
 import os
+import re
 from pathlib import Path
 from typing import NamedTuple, Protocol, cast
 
@@ -96,10 +97,10 @@ def find(name: str | os.PathLike[str]) -> PolicyFile | None:
     """Return the file of another library that a policy's name gives; None for a name of another kind."""
     text = os.fspath(name)
     for extension in READERS:
-        first, plus, further = text.partition(f"{extension}+")
-        if plus and further:
-            return PolicyFile(Path(first + extension), Path(further), extension)
-        if first.endswith(extension):
+        match = re.fullmatch(rf"(.*?{re.escape(extension)})\+(.+)", text, re.IGNORECASE | re.DOTALL)
+        if match is not None:
+            return PolicyFile(Path(match[1]), Path(match[2]), extension)
+        if text.lower().endswith(extension):
             return PolicyFile(Path(text), None, extension)
     return None
 

@@ -52,7 +52,7 @@ def source(name: str, preset: str | None = None) -> Source:
         check_preset_name(preset)
     if policies.is_file(name):
         return _play_source(name, preset)
-    if name.endswith(".npz"):
+    if name.lower().endswith(".npz"):
         return _saved_source(name)
     if ":" in name:
         return _play_source(name, preset)

@@ -14,6 +14,7 @@ from arc_suite import evaluation, policies
 from arc_suite.bodies import generator
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
+from arc_suite.evaluation import provenance
 from arc_suite.policies import network
 from arc_suite.policies.graph import OPERATORS, check_graph
 from arc_suite.policies.tracing import traced
@@ -193,6 +194,14 @@ def test_is_a_policy_of_every_program(saved, name, monkeypatch):
     assert evaluation.episodes_in_batch(envs, policy, range(3)) == alone
     monkeypatch.chdir(saved.parent)
     assert policies.policy(saved.name, "tick").setup.robot == "tick"
+
+
+def test_a_file_may_have_its_extension_in_capitals(saved, monkeypatch):
+    (saved / "policy.npz").rename(saved / "WALK.NPZ")
+    monkeypatch.chdir(saved)
+    assert policies.policy("WALK.NPZ", "tick").setup.robot == "tick"
+    assert policies.load_network("WALK.NPZ").setup.robot == "tick"
+    assert provenance.policy_sha256("WALK.NPZ") == network.digest(made())
 
 
 def test_of_another_body(saved):

@@ -29,6 +29,9 @@ def write(path, **data):
 def test_names():
     assert find("a/ppo.zip") == (Path("a/ppo.zip"), None, ".zip")
     assert find(with_further_file("ppo.zip", "b/stats.pkl")) == (Path("ppo.zip"), Path("b/stats.pkl"), ".zip")
+    assert find("a/PPO.ZIP+b/stats.pkl") == (Path("a/PPO.ZIP"), Path("b/stats.pkl"), ".zip")
+    assert find("PPO.Zip") == (Path("PPO.Zip"), None, ".zip")
+    assert find("a.zip+b.zip+c") == (Path("a.zip"), Path("b.zip+c"), ".zip")
     assert find("cpg") is find("policy.npz") is find("my.zip:make") is find("ppo.zip+") is None
 
 

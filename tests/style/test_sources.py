@@ -47,6 +47,13 @@ def take(opened, setup, seeds):
     return [recorder() for recorder in opened.recorders(setup, seeds)]
 
 
+def test_a_file_may_have_its_extension_in_capitals(leaper, tmp_path):
+    path = tmp_path / "LEAPER.NPZ"
+    style.save(path, leaper)
+    for track, before in zip(take(source(str(path)), LEAPER, (3, 4)), leaper, strict=True):
+        assert_same(track, before)
+
+
 def test_policies_walk_any_body_once_for_each_seed():
     opened = source("zero")
     assert (opened.label, opened.setup) == ("zero", None)

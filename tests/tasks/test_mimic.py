@@ -188,8 +188,9 @@ def test_far_from_its_motion_an_episode_ends():
     assert environment.task.progress["fell"]
 
 
-def test_settings_hold_the_motion_of_a_file(tmp_path):
-    path = tmp_path / "nod.npz"
+@pytest.mark.parametrize("name", ["nod.npz", "NOD.NPZ"])
+def test_settings_hold_the_motion_of_a_file(name, tmp_path):
+    path = tmp_path / name
     motions.save(nod(), path)
     setup = Setup.of("tick", "mimic", {"motion": str(path)})
     assert Setup.of("tick", "mimic", {"motion": path}) == setup

@@ -144,7 +144,7 @@ def check_files(robots: list[str]) -> None:
     outputs.check_folders("output")
     for flag, extension in (("page", ".html"), ("save", ".npz")):
         path = FLAGS[flag].value
-        if path is not None and not path.endswith(extension):
+        if path is not None and not path.lower().endswith(extension):
             raise ValueError(f"--{flag}={path}: expected a file that ends in {extension}")
     if FLAGS.save is not None and len(robots) > 1:
         raise ValueError(f"--save={FLAGS.save}: expected one robot, got {', '.join(robots)}")

@@ -85,7 +85,7 @@ def find_policies(folder: Path) -> dict[tuple[str, str, int], Path]:
         paths = sorted(filter(_is_policy, folder.iterdir()))
     for path in paths:
         if path.name not in NAMES:
-            (nearest_name,) = difflib.get_close_matches(path.name, NAMES, n=1, cutoff=0.0)
+            (nearest_name,) = difflib.get_close_matches(path.name.lower(), NAMES, n=1, cutoff=0.0)
             expected = f"ROBOT-TASK-SEED of a place and a seed from 0 to {SEEDS - 1}"
             raise ValueError(f"{path}: expected {expected}, such as {nearest_name}")
         run = NAMES[path.name]
@@ -98,8 +98,9 @@ def find_policies(folder: Path) -> dict[tuple[str, str, int], Path]:
 
 
 def _is_policy(path: Path) -> bool:
-    is_skipped = path.name[0] in "._"
-    return not is_skipped and (path.suffix in ENDINGS or path.name in NAMES or policies.is_file(os.fspath(path)))
+    if path.name[0] in "._":
+        return False
+    return path.suffix.lower() in ENDINGS or path.name in NAMES or policies.is_file(os.fspath(path))
 
 
 def _judge_policy(

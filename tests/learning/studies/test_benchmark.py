@@ -323,6 +323,7 @@ def test_errors_are_one_line(tmp_path, arguments, line):
     [
         ("tick-wlk-1.npz", "expected ROBOT-TASK-SEED of a place and a seed from 0 to 2, such as tick-walk-1.npz"),
         ("leaper-walk-7.zip", "expected ROBOT-TASK-SEED of a place and a seed from 0 to 2, such as leaper-walk-2.zip"),
+        ("tick-walk-1.ZIP", "expected ROBOT-TASK-SEED of a place and a seed from 0 to 2, such as tick-walk-1.zip"),
         ("queen-gap.py", "expected ROBOT-TASK-SEED of a place and a seed from 0 to 2, such as queen-gaps-2.py"),
         ("tick-walk-0.py", "expected one policy of this place and seed, got tick-walk-0.npz, too"),
         ("tick-walk-01/policy.npz", "expected ROBOT-TASK-SEED of a place and a seed from 0 to 2, such as tick-walk-1"),
