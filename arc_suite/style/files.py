@@ -6,7 +6,7 @@ the reward's terms, has an array for each entry, `i/terms/forward`. Numbers are 
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from arc_suite import archives, checks, files, parsers, registry, versions
 from arc_suite.envs.setup import Setup
 from arc_suite.robots.spec import Body
-from arc_suite.style.tracks import UNTIMED, Track
+from arc_suite.style.tracks import UNTIMED, Track, only_setup
 from arc_suite.tasks.parameters import Parameters
 
 FORMAT = "arc_suite tracks 4"  # another number for every change of what a file holds
@@ -40,17 +40,15 @@ class _OtherFormat(ValueError):
     """A file of another format."""
 
 
-def save(path: str | os.PathLike[str], tracks: Sequence[Track]) -> None:
+def save(path: str | os.PathLike[str], tracks: Iterable[Track]) -> None:
     """Write tracks of one setup, atomically.
 
     Raises:
         ValueError: no tracks, or tracks of several setups.
         OSError: the file cannot be written.
     """
-    setups = {track.setup for track in tracks}
-    if len(setups) != 1:
-        raise ValueError(f"tracks: expected those of one setup, got {sorted(map(str, setups))}")
-    (setup,) = setups
+    tracks = list(tracks)
+    setup = only_setup(tracks)
     arrays: dict[str, Any] = {
         "format": FORMAT,
         "setup": json.dumps(setup.to_dict()),

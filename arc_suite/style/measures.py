@@ -1,13 +1,13 @@
 """Reports of style: all metrics of a track by name, and their statistics over episodes."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from arc_suite import evaluation
 from arc_suite.style import metrics
-from arc_suite.style.tracks import Track
+from arc_suite.style.tracks import Track, only_setup
 from arc_suite.tasks.clock import TWO_PI
 
 _TOLERANCE = 1e-4  # relative error of a frequency that is measured from the clock
@@ -109,14 +109,19 @@ def _measurement(track, name, values) -> Measurement:
     return Measurement(value, dict(zip(track.legs, map(float, values), strict=True)))
 
 
-def report(tracks: Sequence[Track]) -> dict[str, Any]:
+def report(tracks: Iterable[Track]) -> dict[str, Any]:
     """Return the metrics of a policy, over tracks of one setup.
 
     Returns:
         `seeds` of the episodes, `return` and `length` as summaries of the evaluation protocol, `progress` as summaries
         by name, and under `metrics`, by name, the `unit`, the mean of the value `prescribed` or None, the summary of
         the `robot`, and of each of the `legs`.
+
+    Raises:
+        ValueError: no tracks, or tracks of several setups.
     """
+    tracks = list(tracks)
+    only_setup(tracks)
     measured = [measure(track) for track in tracks]
     return {
         "seeds": [track.seed for track in tracks],

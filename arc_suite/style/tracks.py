@@ -1,12 +1,12 @@
 """Records rollouts as plain arrays: all that a report of style needs."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from arc_suite import evaluation
+from arc_suite import checks, evaluation
 from arc_suite.envs.dm import Environment
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import Policy
@@ -128,6 +128,18 @@ class Track(NamedTuple):
         return reward(self.terms, self.weights)[1]
 
 
+def only_setup(tracks: Iterable[Track]) -> Setup:
+    """Return the setup of tracks.
+
+    Raises:
+        ValueError: no tracks, or tracks of several setups.
+    """
+    setups = {track.setup for track in tracks}
+    if len(setups) != 1:
+        raise ValueError(f"tracks: expected those of one setup, got {sorted(map(str, setups))}")
+    return setups.pop()
+
+
 def record(environment: Environment, policy: Policy, seed: int, max_steps: int | None = None) -> Track:
     """Play one episode of the evaluation protocol and record it.
 
@@ -137,14 +149,16 @@ def record(environment: Environment, policy: Policy, seed: int, max_steps: int |
         environment: environment of `arc_suite.load`.
         policy: made for one environment.
         seed: seed of the episode's start.
-        max_steps: control steps after which to stop; None for a whole episode.
+        max_steps: control steps after which to stop, at least 1; None for a whole episode.
 
     Returns:
         The track; without phases, duty factors and parameters if the task prescribes no gait.
 
     Raises:
-        ValueError: a setting of the environment's task that JSON cannot hold, such as an `Arena`.
+        ValueError: no step, or a setting of the environment's task that JSON cannot hold, such as an `Arena`.
     """
+    if max_steps is not None:
+        checks.integer("max_steps", max_steps, 1)
     run = environment.task
     task = run.definition
     model = environment.physics.model.ptr

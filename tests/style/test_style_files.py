@@ -64,6 +64,13 @@ def test_tracks_of_a_task_without_a_gait_survive_too(tmp_path):
     assert style.report([track])["metrics"].keys() == style.report(tracks)["metrics"].keys()
 
 
+def test_tracks_of_a_generator_are_saved_and_reported(leaper, saved, tmp_path):
+    save(tmp_path / "tracks.npz", (track for track in leaper))
+    for track, before in zip(load(tmp_path / "tracks.npz"), leaper, strict=True):
+        assert_same(track, before)
+    assert_same(style.report(track for track in leaper), style.report(leaper))
+
+
 def test_a_file_says_what_made_it(saved):
     with np.load(saved, allow_pickle=False) as arrays:
         assert arrays["format"] == "arc_suite tracks 4"
@@ -80,6 +87,8 @@ def test_what_cannot_be_saved_is_refused(leaper, tmp_path):
     for tracks, found in (([], r"\[\]"), (leaper + recorded("tick", steps=2), r"\['leaper, walk', 'tick, walk'\]")):
         with pytest.raises(ValueError, match=f"^tracks: expected those of one setup, got {found}$"):
             save(tmp_path / "a.npz", tracks)
+        with pytest.raises(ValueError, match=f"^tracks: expected those of one setup, got {found}$"):
+            style.report(tracks)
     with pytest.raises(ValueError, match="^task_kwargs: expected values that JSON can hold: Object of type Flat is"):
         recorded("tick", steps=2, arena=FLAT)
     assert not list(tmp_path.iterdir())

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from refusals import refused
 from synthetic import synthetic
 from tiers import tiers
 
@@ -21,6 +22,14 @@ from arc_suite.robots import ROBOTS, gaits
 from arc_suite.style import measure, record, report
 from arc_suite.style.tracks import lowest_point_velocities
 from arc_suite.tasks.clock import TWO_PI, desired_contacts
+
+
+@pytest.mark.parametrize("steps", [0, -1, 2.5, True])
+def test_a_track_has_a_step(steps):
+    environment = arc_suite.load("tick", "walk")
+    with refused(f"max_steps: expected an integer from 1, got {steps}"):
+        record(environment, Demonstrator("tick", "medium"), seed=3, max_steps=steps)
+    assert len(record(environment, Demonstrator("tick", "medium"), seed=3, max_steps=1).times) == 1
 
 
 @pytest.mark.parametrize("robot", tiers(ROBOTS, lambda robot: robot == "bastion"))
