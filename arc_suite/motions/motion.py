@@ -111,11 +111,7 @@ def make(
     positions = np.asarray(positions, float)
     quaternions = np.asarray(quaternions, float)
     angles = np.asarray(angles, float)
-    frames = positions.shape[:1]  # a number has none
-    _check_shape("positions", positions, (*frames, 3))
-    _check_shape("quaternions", quaternions, (*frames, 4))
-    _check_shape("angles", angles, (*frames, len(body.joint_names)))
-    _check_frames(len(positions))
+    _check_shapes(positions, quaternions, angles, len(body.joint_names))
     quaternions = make_continuous(quaternions)
     positions, quaternions = _start_at_origin(positions, quaternions)
     soles = find_soles(legs, positions, quaternions, angles) / standing_height
@@ -304,6 +300,15 @@ def continue_signs(quaternions: np.ndarray) -> np.ndarray:
 def _check_frames(frames: int) -> None:
     if not 2 <= frames <= MAX_FRAMES:
         raise ValueError(f"frames: expected from 2 to {MAX_FRAMES}, got {frames}")
+
+
+def _check_shapes(positions: np.ndarray, quaternions: np.ndarray, angles: np.ndarray, joints: int) -> None:
+    """Check that arrays have as many frames, and the numbers of a pose in each."""
+    frames = positions.shape[:1]  # a number has none
+    _check_shape("positions", positions, (*frames, 3))
+    _check_shape("quaternions", quaternions, (*frames, 4))
+    _check_shape("angles", angles, (*frames, joints))
+    _check_frames(len(positions))
 
 
 def _check_shape(field: str, values: np.ndarray, shape: tuple[int, ...]) -> None:

@@ -249,12 +249,15 @@ def test_what_a_policy_learned_from_is_what_its_file_says(tmp_path):
             assert provenance.training_seeds(str(tmp_path / "policy.npz"), range(10)) == seeds
 
 
-def test_settings_of_a_dataset_hold_the_name_of_a_function(tmp_path, monkeypatch):
+def test_settings_of_a_dataset_hold_the_hash_of_the_file_of_a_function(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     setup, records = Setup.of("tick"), []
     for code in ("def make(robot):\n    return None\n", "def make(robot):\n    return len\n"):
         pathlib.Path("own.py").write_text(code)
+        pathlib.Path("imported.py").write_text(code)
         records.append(data.DatasetSettings(setup, "own.py:make", ()).provenance())
+    hashes = [record.pop("policy_sha256") for record in records]
+    assert hashes[0] != hashes[1]
     assert records[0] == records[1] and records[0]["policy"] == "own.py:make"
 
 

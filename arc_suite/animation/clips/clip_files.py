@@ -1,6 +1,5 @@
 """Files of clips: a glTF file with its metrics, a motion, a film, or a sheet of sprites."""
 
-import contextlib
 import functools
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -96,9 +95,7 @@ def animate(
     options = {name: value for name, value in options.items() if value is not None}
     clip_options: dict[str, Any] = {"weight": weight, "straight": straight, "plant": plant}
     recording_progress = functools.partial(progress, desc="recording", unit="clip", leave=False)
-    with contextlib.ExitStack() as stack:
-        temporary = stack.enter_context(files.writing(path))
-        metrics = stack.enter_context(files.writing_json(metrics_file(path)))
+    with files.writing(path) as temporary, files.writing_json(metrics_file(path)) as metrics:
         names = catalog.clip_names() if names == [ALL] else names
         catalog_names = [name for name in names if not _is_motion(name)]
         made_clips = [_read_clip(setup.body, name, fps) for name in names if _is_motion(name)]

@@ -91,12 +91,19 @@ def record(
             warmstart = data.qacc_warmstart.copy()
     scene = environment.task.definition.scene
     controls = np.repeat(control_of_step[settle:], scene.substeps, axis=0)
-    states, _ = rollout.rollout(model, mujoco.MjData(model), first_state, controls[None], initial_warmstart=warmstart)
-    later_qpos = states[0, :, 1 : 1 + model.nq]  # in a full state, time comes first and then the positions
+    later_qpos = _repeat_substeps(model, first_state, warmstart, controls)
     if not np.array_equal(later_qpos[-1], data.qpos):
         raise ValueError("it is moved by more than its controls, as by kicks, which clips leave out")
     qpos = np.concatenate([first_qpos, later_qpos])
     return Recording(model.opt.timestep, scene.substeps, pose(qpos, scene.layout))
+
+
+def _repeat_substeps(
+    model: mujoco.MjModel, first_state: np.ndarray, warmstart: np.ndarray, controls: np.ndarray
+) -> np.ndarray:
+    """Return the positions (substeps, nq) after substeps with controls (substeps, motors), from a full state on."""
+    states, _ = rollout.rollout(model, mujoco.MjData(model), first_state, controls[None], initial_warmstart=warmstart)
+    return states[0, :, 1 : 1 + model.nq]  # in a full state, time comes first and then the positions
 
 
 def samples_to_rest(recording: Recording) -> int:

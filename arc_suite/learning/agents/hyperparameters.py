@@ -153,7 +153,7 @@ class SoftActorCritic:
         }
         _check_numbers(self, ranges)
         updates = self.utd_ratio if self.utd_ratio > 1.0 else self.num_envs * self.utd_ratio
-        if not updates or not math.isclose(updates, round(updates)):  # 100 * 0.07 is not 7 to the bit
+        if not updates or not math.isclose(updates, round(updates)):  # rounding makes 100 * 0.07 another number than 7
             raise ValueError(
                 f"utd_ratio: expected a whole number of updates when {self.num_envs} environments step, of each if "
                 f"it is above 1, got {checks.preview(self.utd_ratio)}"
