@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NoReturn
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from arc_suite import checks
 from arc_suite.policies.graph import INPUT, Graph, Node, Shape, shape_of
@@ -75,7 +76,7 @@ class _Writer:
         shape = self.shapes[name]
         return Traced(self, name, np.arange(math.prod(shape)).reshape(shape))
 
-    def constant(self, value: Any, dtype: type = np.float32) -> "Traced":
+    def constant(self, value: Any, dtype: DTypeLike = np.float32) -> "Traced":
         """Add an array, of int32 for indices."""
         array = np.asarray(value)
         name = str(len(self.arrays))

@@ -117,8 +117,11 @@ TESTS = {
     "`--overwrite` keeps the old dataset until the new one is complete.": [
         f"{STORAGE}::test_killed_at_any_change_of_files_the_dataset_opens_and_the_same_command_completes_it"
     ],
-    "The settings contain only the name of a function of your own: collect again after you change its code.": [
-        f"{HERE}::test_settings_of_a_dataset_hold_the_name_of_a_function"
+    "The settings contain the hash of a policy's file, also of a module with a function of your own.": [
+        f"{HERE}::test_settings_of_a_dataset_hold_the_hash_of_the_file_of_a_function"
+    ],
+    "Files that it imports or reads do not count: collect again after you change those.": [
+        f"{HERE}::test_settings_of_a_dataset_hold_the_hash_of_the_file_of_a_function"
     ],
     "Datasets and tracks are data: the suite imports nothing that they name.": [
         "data/test_bad_faith.py::test_metadata_import_nothing",
