@@ -61,7 +61,9 @@ def collect(
         OSError: the disk is full, or another error of writing. Finished episodes are kept.
         KeyboardInterrupt: Ctrl-C. Finished episodes are kept.
     """
-    _check_settings(settings, episodes)
+    episodes = checks.integer("episodes", episodes, 0)
+    num_envs = checks.integer("num_envs", num_envs, 1)
+    settings = _check_settings(settings, episodes)
     checks.boolean("overwrite", overwrite)
     checks.boolean("wait", wait)
     named_metadata = _make_named_metadata(author, code_permalink)
@@ -76,6 +78,8 @@ def collect(
                         storage.metadata = _metadata(dataset_id, settings, provenance, threads)
                     storage.metadata |= named_metadata
                     _play(storage, settings, missing, num_envs, threads, progress)
+                elif storage.metadata is not None:
+                    storage.add_metadata(named_metadata)
             finally:
                 if not overwrite or storage.kept.issuperset(missing):
                     storage.finish(functools.partial(progress, desc="merging", unit="episode", leave=False))
@@ -99,11 +103,21 @@ def _make_named_metadata(author: str | None, code_permalink: str | None) -> dict
     return metadata
 
 
-def _check_settings(settings: DatasetSettings, episodes: int) -> None:
-    checks.integer("steps", settings.steps, 1)
+def _check_settings(settings: DatasetSettings, episodes: int) -> DatasetSettings:
+    """Return the settings with numbers of Python, given the number of episodes of the complete dataset.
+
+    Raises:
+        ValueError: a number out of range, or no such policy.
+    """
     last = seed_ranges.COLLECTING[-1] - (episodes - 1)
-    checks.integer(f"seed of the first of {episodes} episodes", settings.seed, seed_ranges.COLLECTING.start, last)
+    first_seed = f"seed of the first of {episodes} episodes"
+    settings = settings._replace(
+        steps=checks.integer("steps", settings.steps, 1),
+        seed=checks.integer(first_seed, settings.seed, seed_ranges.COLLECTING.start, last),
+        noise=checks.number("noise", settings.noise, 0.0),
+    )
     _policy(settings, num_envs=1, task=settings.setup.definition)  # raises an error if there is no such policy
+    return settings
 
 
 def _policy(settings: DatasetSettings, num_envs: int, task: Task | None = None) -> policies.Policy:

@@ -136,6 +136,19 @@ class Storage:
                 temporary.write_bytes(file.id.get_file_image())
         self._stored |= {index: StoredEpisode(path, episode.length) for index, episode in finished.items()}
 
+    def add_metadata(self, metadata: Mapping[str, Any]) -> None:
+        """Add to the metadata of a dataset that lacks no episode; those that it has leave its file as it is.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        if metadata.items() <= self.metadata.items():
+            return
+        self.metadata |= metadata
+        has_new_episodes = self._continues  # with which `finish` writes the metadata
+        if not has_new_episodes:
+            _write_metadata(self._data, self.metadata)
+
     def finish(self, progress: Callable[..., Any]) -> None:
         """Merge the episodes before the first missing one into the dataset. If none is missing, delete the parts.
 

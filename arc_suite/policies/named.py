@@ -121,7 +121,7 @@ def policy(
             action.
         robot: a body; see `registry.body_of`.
         presets: presets of the demonstrator, a name or several that take turns from seed to seed, see
-            `cpg.Demonstrator`; None for the one that suits the task and the body.
+            `cpg.Demonstrator`; None for the one that suits the task and the body. Other policies take none.
         num_envs: number of environments.
         noise: standard deviation of normal noise on the actions, by the episode's seed.
         task: the task in which it acts, to which the demonstrator is fitted. None for walk with default settings.
@@ -138,6 +138,7 @@ def policy(
     preset_list = (presets,) if isinstance(presets, str) else tuple(presets)
     for preset in preset_list:
         check_preset_name(preset)
+        check_preset(name, preset)
     checks.number("noise", noise, 0.0)
     source = None
     if isinstance(name, str | os.PathLike) and name not in POLICIES:

@@ -260,6 +260,11 @@ def test_author_and_code_are_in_the_metadata_where_they_are_said(kept):
 
     metadata = minari.load_dataset(ID).storage.metadata
     assert (metadata["author"], metadata["code_permalink"]) == ({"A. Walker"}, "file:///walks/1")
+    before = digests()
+    assert collect(ID, SETTINGS, 4, author="B. Walker") == 0  # a complete dataset
+    metadata = minari.load_dataset(ID).storage.metadata
+    assert (metadata["author"], metadata["code_permalink"]) == ({"B. Walker"}, "file:///walks/1")
+    assert metadata["total_episodes"] == 4 and digests() == before
 
 
 def test_a_spec_of_the_environment_that_contradicts_the_settings_is_refused(kept):

@@ -281,9 +281,33 @@ def test_a_dataset_from_before_hashes_of_policy_files_goes_on(root):
     assert collect(ID, settings, 2) == 1
 
 
+def test_numbers_of_numpy_are_those_of_python():
+    settings = data.DatasetSettings(TICK, "zero", noise=np.float32(0.5), seed=np.int64(20_000), steps=np.int32(5))
+    assert collect(ID, settings, np.int64(2), num_envs=np.int64(2)) == 2
+    same_settings = data.DatasetSettings(TICK, "zero", noise=0.5, seed=20_000, steps=5)
+    assert data.open(ID).settings == same_settings
+    assert collect(ID, same_settings, 2) == 0
+
+
+@pytest.mark.parametrize(
+    ("counts", "message"),
+    [
+        ({"episodes": 2.5}, "episodes: expected an integer from 0, got 2.5"),
+        ({"episodes": -1}, "episodes: expected an integer from 0, got -1"),
+        ({"episodes": 2, "num_envs": 0}, "num_envs: expected an integer from 1, got 0"),
+    ],
+)
+def test_wrong_counts_leave_nothing_behind(root, counts, message):
+    with refused(message, begins=True):
+        collect(ID, SETTINGS, **counts)
+    assert not root.exists()
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
+        ({"policy": "zero", "presets": ("medium",)}, "preset 'medium': goes with the policy cpg, got 'zero'"),
+        ({"seed": 10_000.5}, "seed of the first of 2 episodes: expected an integer from 10000 to 99998, got 10000.5"),
         ({"presets": ("fats",)}, "unknown preset 'fats'; did you mean 'fast'?"),
         ({"policy": "cgp", "presets": ()}, "unknown policy 'cgp'; did you mean 'cpg'?"),
         ({"policy": "nowhere:make", "presets": ()}, "policy 'nowhere:make': No module named 'nowhere'"),

@@ -85,7 +85,8 @@ def test_policies_that_are_no_demonstrators_give_the_actions_that_a_task_takes()
         (("cpg", "queen", "midium"), f"unknown preset 'midium'; did you mean 'medium'? (there are: {ALL})"),
         (("cpg", generate(4, 2), "tuned"), f"unknown preset 'tuned' (there are: {GENERAL}, posed)"),
         (("cpg", "queen", ()), f"preset: expected one or more of {ALL}, got none"),
-        (("zero", "queen", "medium", 1, -0.1), "noise: expected a finite number of at least 0, got -0.1"),
+        (("zero", "tick", "medium"), "preset 'medium': goes with the policy cpg, got 'zero'"),
+        (("zero", "queen", (), 1, -0.1), "noise: expected a finite number of at least 0, got -0.1"),
         (("cpg", ROBOTS["bastion"].replace(name="queen")), f"walk: {JOINTS}, got 12; give it another name"),
     ],
 )

@@ -107,7 +107,7 @@ def command_line(sketch: Sketch) -> str:
         body_flags = ["--spec", spec_file_name(body)]
     setting_flags = [f"--set={name}={_flag_value(value)}" for name, value in _settings_with_files(sketch, body).items()]
     policy_flags = [] if sketch.policy == "cpg" else ["--policy", sketch.policy]
-    preset_flags = [] if sketch.preset == DEFAULT_CHOICE else ["--preset", sketch.preset]
+    preset_flags = [] if chosen_preset(sketch) is None else ["--preset", sketch.preset]
     task_flags = ["--task", sketch.task, *setting_flags]
     return shlex.join(["arc-suite", "view", *body_flags, *task_flags, *policy_flags, *preset_flags])
 

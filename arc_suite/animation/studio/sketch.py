@@ -192,12 +192,12 @@ def make_setup(sketch: Sketch) -> Setup:
 
 
 def chosen_preset(sketch: Sketch) -> str | None:
-    """Return the demonstrator's preset; None for the one that suits the task and the body.
+    """Return the demonstrator's preset; None for the one that suits the task and the body, and for other policies.
 
     Raises:
         NotImported: the preset's module has not been imported yet. A visitor of the page imports nothing.
     """
-    if sketch.preset == DEFAULT_CHOICE:
+    if sketch.preset == DEFAULT_CHOICE or sketch.policy != "cpg":
         return None
     return registry.refuse_import("law", sketch.preset)  # a law of another package has a preset of its name
 
