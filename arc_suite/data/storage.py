@@ -136,7 +136,7 @@ class Storage:
                 temporary.write_bytes(file.id.get_file_image())
         self._stored |= {index: StoredEpisode(path, episode.length) for index, episode in finished.items()}
 
-    def add_metadata(self, metadata: Mapping[str, Any]) -> None:
+    def add_metadata(self, metadata: dict[str, Any]) -> None:
         """Add to the metadata of a dataset that lacks no episode; those that it has leave its file as it is.
 
         Raises:

@@ -131,7 +131,7 @@ class Report(NamedTuple):
 
     def to_json(self) -> dict[str, Any]:
         """Return the entry of a robot in the file of `arc-suite evaluate --json`."""
-        return {
+        values = {
             "provenance": provenance.of_setup(self.setup),
             "preset": self.preset,
             "zero_return": self.zero,
@@ -141,9 +141,9 @@ class Report(NamedTuple):
             "no_score": self.flaw,
             "anchors": {field: getattr(self.scale, field) for field in ("zero", "demonstrator", "preset")},
             "length": self.length,
-            **self.progress,
-            "episodes": self.episodes,
         }
+        # No metric takes the place of another value.
+        return {**values, **self.progress, **values, "episodes": self.episodes}
 
 
 def evaluate(

@@ -56,10 +56,11 @@ class Evaluator:
     def play(self, step: int, policy: Network) -> Lines:
         """Play the episodes of an evaluation, and return their lines."""
         episodes = evaluation.episodes_in_batch(self._environment, policy, self._seeds)
-        return [
-            {"step": step, "seed": seed, "return": episode.total, "length": episode.length, **episode.progress}
-            for seed, episode in zip(self._seeds, episodes, strict=True)
-        ]
+        lines = []
+        for seed, episode in zip(self._seeds, episodes, strict=True):
+            values = {"step": step, "seed": seed, "return": episode.total, "length": episode.length}
+            lines.append({**values, **episode.progress, **values})  # no metric takes the place of another value
+        return lines
 
     def pop_results(self, wait: bool) -> Iterator[tuple[int, Lines]]:
         """Yield the steps and lines of the evaluations that have ended since the last call."""
