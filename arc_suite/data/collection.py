@@ -85,12 +85,16 @@ def collect(
                     storage.finish(functools.partial(progress, desc="merging", unit="episode", leave=False))
         except (ValueError, OSError, KeyboardInterrupt) as error:
             count = len(storage.kept.intersection(range(episodes)))
-            note = f"{count} of {episodes} episodes of {dataset_id!r} are kept"
-            if isinstance(error, KeyboardInterrupt):
-                raise KeyboardInterrupt(f"interrupted; {note}") from None
-            error_type = ValueError if isinstance(error, ValueError) else OSError
-            raise error_type(f"{error}; {note}") from None
+            raise _add_note(error, f"{count} of {episodes} episodes of {dataset_id!r} are kept") from None
         return len(missing)
+
+
+def _add_note(error: ValueError | OSError | KeyboardInterrupt, note: str) -> BaseException:
+    """Return an error of the same kind with a note."""
+    if isinstance(error, KeyboardInterrupt):
+        return KeyboardInterrupt(f"interrupted; {note}")
+    error_type = ValueError if isinstance(error, ValueError) else OSError
+    return error_type(f"{error}; {note}")
 
 
 def _make_named_metadata(author: str | None, code_permalink: str | None) -> dict[str, Any]:

@@ -6,9 +6,10 @@ import pytest
 from arc_suite.animation.clips.catalog import CLIPS
 from arc_suite.animation.clips.drafts import make_drafts
 
+# Clips that are left out, and the beginning of the line that says why; one of two where processors differ by a bit.
 LEFT_OUT_OF_BODY = {
     "leaper": {
-        "strafe_left": "the pose does not return within 2 degrees: 3.3 after 1 cycles",
+        "strafe_left": ("the pose does not return within 2 degrees: ", "torso or legs are 0.03"),
         "jump": "its feet come down 0.14 standing heights from where they stood, more than 0.1",
     },
     "bastion": {"leap": "it does not land on its feet"},
@@ -34,5 +35,7 @@ def test_clips_keep_to_bounds_or_are_left_out(name):
     body = clip_sets.load_body(name)
     left_out = {}
     drafts = make_drafts(clip_sets.make_recorder(body), clips, iter, left_out)
-    assert {clip: left_out[clip] for clip in clips if clip in left_out} == LEFT_OUT_OF_BODY[name]
+    assert left_out.keys() & set(clips) == LEFT_OUT_OF_BODY[name].keys()
+    for clip, line in LEFT_OUT_OF_BODY[name].items():
+        assert left_out[clip].startswith(line)
     assert clip_sets.broken(body, {clip: drafts[clip] for clip in clips if clip not in left_out}) == {}
