@@ -425,4 +425,5 @@ def test_pages_show_the_ground(tmp_path):
         grounds = play_pages.creature(TICK, arena=word)["grounds"]
         assert list(grounds) == [name.partition(".")[0], "level", "bumps", "slopes"]
         surface = next(iter(grounds.values()))["surface"]
-        assert_allclose(max(map(max, surface["heights"])), arena.surface.heights.max(), atol=2e-3)
+        # Points of a page are farther apart.
+        assert_allclose(max(map(max, surface["heights"])), arena.surface.heights.max(), atol=0.02 * HEIGHT)
