@@ -106,7 +106,7 @@ def measure_paces(body, recorder: Recorder, made) -> dict[str, float]:
         schedule = clock.desired_contacts(phases, parameters.duty_factor, parameters.phase_offsets)
         numbers[f"{name} duty"] = is_down.mean()
         numbers[f"{name} in schedule"] = (is_down == schedule).mean()
-        numbers[f"{name} lift"] = soles.max(axis=0).mean() / body.torso.standing_height
+        numbers[f"{name} clearance"] = soles.max(axis=0).mean() / body.torso.standing_height
         if name != "walk" and "walk" in made:
             numbers[f"{name} speed"] = draft.motion.twist[0] / made["walk"].motion.twist[0]
             numbers[f"{name} cadence"] = made["walk"].cycle / draft.cycle
