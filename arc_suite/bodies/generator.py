@@ -309,15 +309,12 @@ def deform_legs(body: Body, changes: np.ndarray) -> Body:
     for leg, images in _legs_with_images(body):
         turn_index = first + len(leg.links)
         logarithms = changes[first:turn_index, None]
-        if mirror.are_images(body, leg, leg):
-            deformed_legs[leg.name] = _deform_leg(leg, logarithms, turn=0.0)
-            first = turn_index
-            continue
-        turn = float(changes[turn_index])
+        has_heading = not mirror.are_images(body, leg, leg)
+        turn = float(changes[turn_index]) if has_heading else 0.0
         deformed_legs[leg.name] = _deform_leg(leg, logarithms, turn)
         for image in images:
             deformed_legs[image.name] = _deform_leg(image, logarithms, -turn)
-        first = turn_index + 1
+        first = turn_index + has_heading
     return _change_body(body, "mutated", legs=[deformed_legs[leg.name] for leg in body.legs])
 
 

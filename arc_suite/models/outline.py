@@ -14,7 +14,8 @@ CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in
 
 def solid_corners(solid: Solid) -> np.ndarray:
     """Return the corners of a box around a solid, turned with it, in the torso's frame: (8, 3)."""
-    return solid.position + (CORNERS * _half_extents(solid)) @ _rotation(solid).T
+    half_extents = np.add(*_split(solid))  # in the solid's frame
+    return solid.position + (CORNERS * half_extents) @ _rotation(solid).T
 
 
 def level_extents(solid: Solid) -> np.ndarray:
@@ -46,19 +47,6 @@ def _rotation(solid: Solid) -> np.ndarray:
     rotation = np.empty(9)
     mujoco.mju_quat2Mat(rotation, quaternion)
     return rotation.reshape(3, 3)
-
-
-def _half_extents(solid: Solid) -> tuple[float, ...]:
-    """Return the half-extents (3,) of the box around a solid, in the solid's frame, m."""
-    radius = solid.size[0]
-    half_length = solid.size[-1]  # without the ends of a capsule
-    if solid.shape == "sphere":
-        return radius, radius, radius
-    if solid.shape == "capsule":
-        return radius, radius, half_length + radius
-    if solid.shape == "cylinder":
-        return radius, radius, half_length
-    return solid.size
 
 
 def geom_corners(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
