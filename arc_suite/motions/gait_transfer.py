@@ -11,12 +11,12 @@ from arc_suite import robots, rotations
 from arc_suite.models.stride import fitted_gait
 from arc_suite.motions.ground_poses import (
     compose,
+    fit_twist,
     ground_poses,
     integrate_twist,
     place_points,
     relative_points,
     relative_pose,
-    twist_to,
 )
 from arc_suite.motions.motion import Motion, continue_signs, find_rest
 from arc_suite.motions.paths import Paths, Size, match_feet, scale_heights, shrink_turns, time_scale
@@ -177,10 +177,11 @@ def _find_root(motion: Motion) -> _Root:
     shares = np.linspace(0.0, 1.0, motion.frames)
     poses = np.concatenate([motion.positions, motion.quaternions], axis=-1)
     torso = ground_poses(poses) / (motion.standing_height, motion.standing_height, 1.0)
-    path = integrate_twist(twist_to(relative_pose(torso[0], torso[-1])), shares)
+    twist, drift = fit_twist(torso)
+    path = integrate_twist(twist, shares) + shares[:, None] * drift
     mean_offset = relative_pose(path, relative_pose(torso[0], torso))[:-1].mean(axis=0)
     path = compose(torso[0], compose(path, mean_offset))
-    return _Root(path, twist_to(relative_pose(path[0], path[-1])))
+    return _Root(path, fit_twist(path)[0])
 
 
 def _soles_on_root(motion: Motion, root: _Root) -> np.ndarray:

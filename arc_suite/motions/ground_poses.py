@@ -8,6 +8,8 @@ import numpy as np
 
 from arc_suite import rotations
 
+_MAX_ARC_TURN = 1.5 * np.pi  # rad, up to which the ends of a path say its twist: those of a whole turn lie together
+
 
 def ground_poses(poses) -> np.ndarray:
     """Return the ground poses (samples, 3) of the torso in poses (samples, 7 + joints); yaw does not jump."""
@@ -64,3 +66,18 @@ def twist_to(ground_pose) -> np.ndarray:
     chord = rotations.to_heading_frame(ground_pose[..., :2], half_turn)
     velocity = chord / np.sinc(half_turn / np.pi)[..., None]
     return np.concatenate([velocity, ground_pose[..., 2:]], axis=-1)
+
+
+def fit_twist(path) -> tuple[np.ndarray, np.ndarray]:
+    """Return the constant twist (3,) of a path, in a unit of time, and how far (3,) its end is from the path's.
+
+    The end is the same up to three quarters of a turn. Beyond, the velocity is the mean one in the moving frame.
+
+    Args:
+        path: (samples, 3) ground poses, both ends included.
+    """
+    displacement = relative_pose(path[0], path[-1])
+    if abs(displacement[2]) <= _MAX_ARC_TURN:
+        return twist_to(displacement), np.zeros(3)
+    twist = twist_to(relative_pose(path[:-1], path[1:])).sum(axis=0)
+    return twist, displacement - integrate_twist(twist, np.ones(1))[0]

@@ -9,7 +9,7 @@ from arc_suite.animation.clips.foot_contacts import MIN_RISE, MIN_RISE_IN_GESTUR
 from arc_suite.animation.clips.planting import slip
 from arc_suite.animation.clips.root_motion import ClipMotion, put_on_root
 from arc_suite.motions import gait_transfer
-from arc_suite.motions.ground_poses import ground_poses, integrate_twist, relative_pose, twist_to
+from arc_suite.motions.ground_poses import fit_twist, ground_poses, integrate_twist, relative_pose
 from arc_suite.robots.spec import Body
 
 
@@ -40,9 +40,12 @@ def clip_of_motion(body: Body, motion: motions.Motion, fps: float) -> Clip:
     poses = np.concatenate([motion.positions, motion.quaternions, motion.angles], axis=-1)
     torso = ground_poses(poses)
     twist = np.zeros(3)
+    drift = np.zeros(3)
     if motion.loops:
-        twist = twist_to(relative_pose(torso[0], torso[-1])) / motion.seconds
+        twist, drift = fit_twist(torso)
+        twist = twist / motion.seconds
     root = integrate_twist(twist, np.arange(motion.frames) / motion.frame_rate)
+    root = root + np.linspace(0.0, 1.0, motion.frames)[:, None] * drift
     clip_motion = put_on_root(1.0 / motion.frame_rate, poses, root, torso_on_root=relative_pose(root, torso))
     clip_motion = clip_motion._replace(twist=twist)
     cycles = gait_transfer.count_cycles(motion)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from arc_suite import animation, motions, registry, rotations
+from arc_suite.animation.clips.motion_of_clip import clip_of_motion
 from arc_suite.motions import reading
 
 
@@ -89,3 +90,22 @@ def test_a_large_turn_survives_fewer_keys(degrees, loops, tmp_path):
     copy, _ = reading.read(tmp_path / "spin.glb", tick)
     assert copy.loops == loops
     np.testing.assert_allclose(np.unwrap(rotations.yaw(copy.quaternions)), turns, atol=np.radians(0.1))
+
+
+@pytest.mark.parametrize("turns", [0.5, 0.999, 1.0, -2.0])
+@pytest.mark.parametrize("radius", [0.0, 1.0])
+def test_root_of_a_loop_of_whole_turns_stays_near_the_torso(turns, radius):
+    tick = registry.body_of("tick")
+    frames = 61
+    yaw = np.linspace(0.0, 2.0 * np.pi * turns, frames)
+    path = np.stack([radius * np.sin(yaw), radius * (1.0 - np.cos(yaw)), np.full(frames, 0.15)], axis=-1)
+    drift = np.linspace(0.0, 0.01, frames)[:, None] * (1.0, 0.0, 0.0)
+    quaternions = np.stack([np.cos(yaw / 2), 0 * yaw, 0 * yaw, np.sin(yaw / 2)], axis=-1)
+    joints = np.zeros((frames, len(tick.joint_names)))
+    motion = motions.make(tick, "spin", 30.0, True, path + drift, quaternions, joints)
+    clip = clip_of_motion(tick, motion, fps=30.0).motion
+    speed = radius * 2.0 * np.pi * turns / motion.seconds
+    np.testing.assert_allclose(clip.twist, (speed, 0.0, 2.0 * np.pi * turns / motion.seconds), atol=0.02)
+    assert abs(clip.positions[:, :2]).max() < 0.02
+    np.testing.assert_allclose(clip.positions[-1], clip.positions[0], atol=1e-12)
+    np.testing.assert_allclose(clip.poses()[:, :3], motion.positions, atol=1e-12)
