@@ -4,7 +4,7 @@ import contextlib
 import os
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -102,7 +102,8 @@ def train_in_one_program(
         Whether all runs are finished.
 
     Raises:
-        ValueError, Diverged, OSError: as `train`.
+        ValueError: runs of several programs, see `group_by_program`, or as `train`.
+        Diverged, OSError: as `train`.
     """
     if len(listeners) == 0:
         listeners = [_ignore_metrics] * len(folders)
@@ -111,9 +112,11 @@ def train_in_one_program(
         run_seeds = [configuration.seed for configuration in configurations]
         for configuration, folder, on_metrics in zip(configurations, folders, listeners, strict=True):
             recording = _record(configuration, folder, usable_cores(), True, run_seeds, on_metrics)
-            recorders.append(stack.enter_context(recording))
+            with usage.pause():  # a policy whose evaluation is pending is no source of the runs before it
+                recorders.append(stack.enter_context(recording))
         contexts = [recorder.context for recorder in recorders]
         all_hyperparameters = [configuration.hyperparameters for configuration in configurations]
+        _check_one_program(recorders, all_hyperparameters)
         all_slices = stack.enter_context(
             contextlib.closing(algorithms.learn_in_one_program(all_hyperparameters, contexts))
         )
@@ -123,20 +126,61 @@ def train_in_one_program(
         while not all(recorder.finished for recorder in recorders):
             with _report_damage(folders), usage.run_learner(configurations[0].algorithm):
                 next_slices = next(all_slices)
-            new_slices = [
-                (recorder, learned_slice)
-                for recorder, learned_slice in zip(recorders, next_slices, strict=True)
-                if learned_slice is not None and not recorder.finished
-            ]
-            for recorder, learned_slice in new_slices:
-                recorder.begin(learned_slice)
-            for recorder, learned_slice in new_slices:  # once the evaluations of all runs have begun
-                recorder.complete(learned_slice)
+            _record_slices(recorders, next_slices)
             if stop():
                 for recorder in recorders:
                     recorder.flush()
                 return all(recorder.finished for recorder in recorders)
     return True
+
+
+def _record_slices(recorders: Sequence["_Recorder"], next_slices: Sequence[Slice | None]) -> None:
+    """Record the slices of runs that are not finished; evaluations of all runs begin before the first completes."""
+    new_slices = [
+        (recorder, learned_slice)
+        for recorder, learned_slice in zip(recorders, next_slices, strict=True)
+        if learned_slice is not None and not recorder.finished
+    ]
+    for recorder, learned_slice in new_slices:
+        recorder.begin(learned_slice)
+    for recorder, learned_slice in new_slices:
+        recorder.complete(learned_slice)
+
+
+def group_by_program(configurations: Sequence[Configuration], folders: Sequence[Path]) -> list[list[int]]:
+    """Return indices of runs in groups that `train_in_one_program` takes together, in the order of their first runs.
+
+    Checkpoints of runs of one program have made equal numbers of steps: a run that was trained on alone is in a group
+    of its own.
+
+    Args:
+        configurations: configurations of the runs.
+        folders: folder of each run.
+
+    Raises:
+        ValueError: a run that learns alone, or a damaged checkpoint; begins with the folder.
+    """
+    groups: dict[Hashable, list[int]] = {}
+    for index, (configuration, folder) in enumerate(zip(configurations, folders, strict=True)):
+        context = configuration.context(folder, checkpoint=run_folder.read_arrays(folder))
+        try:
+            program = algorithms.program_of(configuration.hyperparameters, context)
+        except ValueError as error:
+            raise ValueError(f"{folder}: {error}") from None
+        groups.setdefault(program, []).append(index)
+    return list(groups.values())
+
+
+def _check_one_program(recorders: Sequence["_Recorder"], all_hyperparameters: Sequence[Any]) -> None:
+    """Raise ValueError if runs differ in what is compiled or in the steps so far."""
+    programs = [
+        algorithms.program_of(hyperparameters, recorder.context)
+        for recorder, hyperparameters in zip(recorders, all_hyperparameters, strict=True)
+    ]
+    for recorder, program in zip(recorders, programs, strict=True):
+        if program != programs[0]:
+            expected = f"expected a run of one program with {recorders[0].folder}, after as many steps"
+            raise ValueError(f"{recorder.folder}: {expected}; `group_by_program` says which learn together")
 
 
 def _ignore_metrics(step: int, metrics: Mapping[str, float]) -> None:

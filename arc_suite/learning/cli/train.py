@@ -55,7 +55,7 @@ from arc_suite.learning.agents import algorithms, configuration, run_folder
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.hyperparameters import DEVICE_DEFAULTS
 from arc_suite.learning.agents.learner import MAX_RUN_SEED
-from arc_suite.learning.agents.training import train, train_in_one_program
+from arc_suite.learning.agents.training import group_by_program, train, train_in_one_program
 from arc_suite.learning.next_commands import has_built_pages, next_commands
 from arc_suite.policies import network
 from arc_suite.simulation.cores import prepare_jax, usable_cores
@@ -317,15 +317,30 @@ def train_seeds(runs: Sequence[Configuration]) -> int:
 
 
 def train_seeds_on_device(runs: Sequence[Configuration]) -> int:
-    """Train runs of several seeds in one program, print their results and their mean, and return the exit status."""
+    """Train runs of several seeds, print their results and their mean, and return the exit status.
+
+    Seeds whose folders hold checkpoints of equal steps learn in one program, one program after the other.
+    """
     refuse_flags(("jobs", "minutes", "until_score"), "goes without several seeds in one program")
     folder = files.folder(FLAGS.output or files.RUNS_FOLDER)
     folders = [folder / run.name for run in runs]
     with resumable(folder), watch_for_termination() as is_terminated, contextlib.ExitStack() as stack:
         listeners = [stack.enter_context(open_listeners(*pair)) for pair in zip(runs, folders, strict=True)]
-        finished = train_in_one_program(runs, folders, progress, listeners, stop=is_terminated)
+        finished_runs = set()
+        for group in group_by_program(runs, folders):
+            if train_in_one_program(
+                [runs[index] for index in group],
+                [folders[index] for index in group],
+                progress,
+                [listeners[index] for index in group],
+                stop=is_terminated,
+            ):
+                finished_runs.update(runs[index].name for index in group)
+            if is_terminated():
+                break
         terminated = is_terminated()
     for run, run_folder_path in zip(runs, folders, strict=True):
+        finished = run.name in finished_runs
         end = describe_end(run_folder_path, None, finished, terminated)
         print(f"{run_folder_path}: {end}, {outcomes.latest_result(run, run_folder_path)}")
         if run_folder.lines(run_folder_path, "evaluations"):

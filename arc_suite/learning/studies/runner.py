@@ -4,14 +4,14 @@ import functools
 import math
 import sys
 import time
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from tqdm import tqdm
 
 from arc_suite import checks, data, files
 from arc_suite.learning import processes
-from arc_suite.learning.agents import algorithms, run_folder, training
+from arc_suite.learning.agents import run_folder, training
 from arc_suite.learning.agents.configuration import DATA_FIELDS
 from arc_suite.learning.agents.hyperparameters import SoftActorCritic
 from arc_suite.learning.agents.learner import Diverged
@@ -80,16 +80,9 @@ def make_on_device(runs: Sequence[Run], folder: Path, minutes: float | None, pro
 
 def _group_by_program(runs: Sequence[Run], folder: Path) -> list[list[Run]]:
     """Return runs in groups that can learn in one program, those with the fewest updates first."""
-    groups: dict[Hashable, list[Run]] = {}
-    for run in runs:
-        arrays = run_folder.read_arrays(folder / run.name)
-        context = run.configuration.context(folder / run.name, checkpoint=arrays)
-        try:
-            program = algorithms.program_of(run.configuration.hyperparameters, context)
-        except ValueError as error:
-            raise ValueError(f"{run.name}: {error}") from None
-        groups.setdefault(program, []).append(run)
-    return sorted(groups.values(), key=lambda group: _count_updates(group[0]))
+    folders = [folder / run.name for run in runs]
+    groups = training.group_by_program([run.configuration for run in runs], folders)
+    return sorted(([runs[index] for index in group] for group in groups), key=lambda group: _count_updates(group[0]))
 
 
 def _count_updates(run: Run) -> int:

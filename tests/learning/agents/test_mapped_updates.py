@@ -1,6 +1,7 @@
 """Several runs of soft actor-critic in one program: each has the numbers of a run alone."""
 
 import functools
+import re
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.hyperparameters import SoftActorCritic
 from arc_suite.learning.agents.off_policy_run import OffPolicyRun
 from arc_suite.learning.agents.replay import Replay, Transitions
-from arc_suite.learning.agents.training import train, train_in_one_program
+from arc_suite.learning.agents.training import group_by_program, train, train_in_one_program
 from arc_suite.learning.studies import runner, tables
 
 NAMES = [name for name, each in algorithms.ALGORITHMS.items() if isinstance(each.hyperparameters, SoftActorCritic)]
@@ -152,6 +153,19 @@ def test_runs_in_one_program_resume(prior, tmp_path):
         for key, array in whole_arrays.items():
             assert_array_equal(arrays[key], array, err_msg=key)
     assert train(runs[0], tmp_path / "parts" / runs[0].name, progress=silent), "finished, as one alone would be"
+
+
+def test_runs_that_have_made_other_numbers_of_steps_are_no_program(tmp_path):
+    """Their updates differ; once each has a checkpoint of its own, they learn in two groups."""
+    setup, fields = Setup.of("tick", "walk", SHORT), {"steps": STEPS, "evaluate_every": 100}
+    runs = [Configuration.of(setup, "sac", small("sac"), seed, **fields) for seed in (0, 3)]
+    folders = [tmp_path / run.name for run in runs]
+    assert group_by_program(runs, folders) == [[0, 1]]
+    assert not train(runs[0], folders[0], progress=silent, stop=lambda: True)
+    assert group_by_program(runs, folders) == [[0], [1]]
+    expected = f"{folders[1]}: expected a run of one program with {folders[0]}, after as many steps; "
+    with pytest.raises(ValueError, match=re.escape(expected)):
+        train_in_one_program(runs, folders, silent)
 
 
 def test_which_runs_are_one_program(prior, tmp_path):
