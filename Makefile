@@ -21,7 +21,8 @@
 #   docs, notebooks     links of the site, its front page in Chromium; the notebooks of examples
 #   web, play, studio   pages in Chromium and Node, played by keys and pointers; the studio, its sliders and its gate
 #   glb, blender, godot clips in Khronos' validator and three programs that open them
-#   robots              robots of others, in wheels (320 MB): they come in, with the same bits, and walk; minutes
+#   robots, robots-release    robots of others, in wheels (320 MB): they come in, with the same bits, and walk, in minutes;
+#                       in all tasks, by all presets, in hours
 #   bodies, survey, following, directing, leaps, clip-sets    many bodies: bit-equality, walks, commands, clips; half an hour to two
 #   soak, fuzz, loopholes, mutants    memory over two million steps; damaged files; policies that cheat; planted mistakes (hours)
 #   absurd              ten thousand absurd values of settings: each is refused, or has an effect; minutes
@@ -246,8 +247,9 @@ check-agents-release: MARKS := long or release
 
 check-bodies: RUN = $(PYTEST) $(PARALLEL) tests/bodies/test_environments.py tests/bodies/test_families.py && \
 	$(PYTHON) tools/survey.py --family varied --count 120
-check-robots: RUN = $(PYTHON) tests/robots_of_others/zoo.py out/robots && \
-	$(PYTHON) tests/robots_of_others/check.py out/robots
+check-robots check-robots-release: RUN = $(PYTHON) tests/robots_of_others/zoo.py out/robots && \
+	$(PYTHON) tests/robots_of_others/check.py out/robots $(TASKS)
+check-robots-release: TASKS := --tasks
 check-survey: RUN = $(PYTHON) tools/survey.py --count 500
 check-following: RUN = $(PYTHON) tests/following.py
 check-directing: RUN = $(PYTHON) tests/directing.py

@@ -1,11 +1,12 @@
 """Import the robots of `zoo.py`, compare their dynamics with their files, and walk them: `make check-robots`, minutes.
 
-python tests/robots_of_others/check.py FOLDER [NAME ...]
+python tests/robots_of_others/check.py FOLDER [--tasks] [NAME ...]
 python tests/robots_of_others/check.py FOLDER --page studies/robots_of_others.md
 
 Prints a table and writes it to FOLDER/robots.csv. Of each file: whether it comes in, in how many of 200 states the
-accelerations have the same bits as the file's own, and the walks of two presets, three seeds of 20 s. Of each task:
-the preset that suits it, its metric, and how many of eight episodes end upright. Fails where
+accelerations have the same bits as the file's own, and the walks of two presets, three seeds of 20 s. With `--tasks`
+(`make check-robots-release`, hours), and for the page, all presets are tried in all tasks, too. Of each task: the
+preset that suits it, its metric, and how many of eight episodes end upright. Fails where
   - a file that should come in does not, or one that should not does;
   - accelerations differ;
   - a robot of MUST_WALK does not walk, or is at its torque limits in 3 % of the samples;
@@ -124,7 +125,7 @@ class Row(NamedTuple):
         return [f"{self.robot.name}: {fault}" for fault in found]
 
 
-def row(robot: zoo.Robot, folder: pathlib.Path) -> Row:
+def row(robot: zoo.Robot, folder: pathlib.Path, with_tasks: bool) -> Row:
     """Import a file and try the body; an error that is no single line is shown by its type."""
     path = zoo.place(robot, folder)
     found, refusal = attempt(import_robot, path, feet=robot.feet)
@@ -138,7 +139,7 @@ def row(robot: zoo.Robot, folder: pathlib.Path) -> Row:
             walks[preset], line = attempt(walk, body, task, preset)
             lines.append(line)
     tasks = ()
-    if robot.group != zoo.ODD:
+    if with_tasks and robot.group != zoo.ODD:
         tasks, line = attempt(try_tasks, body)
         lines.append(line)
     flawed, line = attempt(flaws, body)
@@ -257,12 +258,14 @@ def _said(each: Walk) -> str:
 def main(folder: str, *names: str) -> int:
     """Try all files, or those that are named; print, write and judge the table."""
     place, write = pathlib.Path(folder), None
+    with_tasks = "--page" in names or "--tasks" in names
     if "--page" in names:
         write, names = table_writer(pathlib.Path(names[-1])), ()
+    names = [name for name in names if name != "--tasks"]
     chosen = [robot for robot in zoo.ROBOTS if not names or robot.name in names]
     rows = []
     with multiprocessing.get_context("spawn").Pool() as pool:
-        for one in [pool.apply_async(row, (robot, place)) for robot in chosen]:
+        for one in [pool.apply_async(row, (robot, place, with_tasks)) for robot in chosen]:
             rows.append(one.get())
             print(" | ".join(cells(rows[-1])), flush=True)
     with (place / "robots.csv").open("w", newline="") as file:
