@@ -195,6 +195,8 @@ def _grounds(arena: str | None) -> dict[str, str]:
     word = registry.arena_word(arena)
     names_of_grounds = {ground: name for name, ground in GROUNDS.items()}
     name = names_of_grounds.get(word) or (ground_text.name_of(word) if ground_text.is_text(word) else word)
+    if GROUNDS.get(name, word) != word:
+        name = f"own {name}"  # a file may have the name of a ground that each page has
     return {name: word, **GROUNDS}
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import programs
 import pytest
 from page_data import data_of
+from PIL import Image
 
 from arc_suite.animation import pacing, pages, play_pages
 from arc_suite.bodies import generator, universal
@@ -375,6 +376,15 @@ def test_what_a_page_holds_of_a_body(monkeypatch):
 )
 def test_a_page_begins_on_the_ground_that_is_asked_for(arena, names):
     assert list(play_pages.creature(ROBOTS["leaper"], arena=arena)["grounds"]) == names
+
+
+@pytest.mark.parametrize("name", ["level", "bumps"])
+def test_a_file_with_the_name_of_a_ground_is_its_own_ground(name, tmp_path):
+    path = tmp_path / f"{name}.png"
+    Image.fromarray(np.linspace(0, 255, 64).astype(np.uint8).reshape(8, 8)).save(path)
+    grounds = play_pages.creature(ROBOTS["leaper"], arena=f"{path}:4x4x0.2")["grounds"]
+    assert list(grounds) == [f"own {name}", "level", "bumps", "slopes"]
+    assert np.ptp(grounds[f"own {name}"]["surface"]["heights"]) == pytest.approx(0.2)
 
 
 def creatures_of(page):

@@ -91,14 +91,15 @@ def make_page(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes
 
 
 def make_playable_page(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
-    """Return a page on which keys steer the creature; see `play_pages`.
+    """Return a page on which keys steer the creature, on its ground at first; see `play_pages`.
 
     Raises:
         ValueError: the scripts of pages have not been built, or the policy does not run in a page.
     """
     sketch = creature.sketch
     preset = sketches.chosen_preset(sketch)
-    playable_creature = play_pages.creature(creature.setup.body, sketch.policy, preset)
+    arena = creature.setup.task_kwargs.get("arena")
+    playable_creature = play_pages.creature(creature.setup.body, sketch.policy, preset, arena)
     return play_pages.page([playable_creature]).encode()
 
 

@@ -47,6 +47,12 @@ def test_the_model_stands_on_the_ground_of_the_task():
     assert mujoco.MjModel.from_xml_string(content(made, "MJCF").decode()).nhfield == 1
 
 
+def test_a_page_to_play_in_begins_on_the_ground_of_the_creature(monkeypatch):
+    monkeypatch.setattr(saving.play_pages, "page", lambda creatures: " ".join(creatures[0]["grounds"]))
+    for ground, names in (("flat", b"level bumps slopes"), ("stairs", b"stairs level bumps slopes")):
+        assert content(open_creature(Sketch(source="tick", ground=ground)), "Page to play in") == names
+
+
 def test_a_picture(creature):
     view = imageio.imread(content(creature, "Picture"))
     assert view.shape == (480, 640, 3) and np.ptp(view) > 100
