@@ -17,7 +17,7 @@ from arc_suite.models.kinematics import Legs
 from arc_suite.models.posture import find_rest_pose
 from arc_suite.models.standing import measure_standing, stability_margin, time_unit
 from arc_suite.motions import gait_transfer
-from arc_suite.motions.motion import Motion, find_rest, make
+from arc_suite.motions.motion import MAX_SEAM, Motion, find_rest, make
 from arc_suite.motions.paths import Paths, Size, match_feet, scale_heights, shrink_turns, time_scale
 from arc_suite.robots.spec import Body
 
@@ -66,7 +66,8 @@ def retarget(motion: Motion, body: Body) -> tuple[Motion, list[str]]:
         body: the body that is to move.
 
     Raises:
-        ValueError: legs do not reach the paths of their feet within `MAX_MISS`, or `MAX_SLIDE`.
+        ValueError: legs do not reach the paths of their feet within `MAX_MISS`, or `MAX_SLIDE`, or a loop does not
+            close.
     """
     transfer = gait_transfer.transfer if gait_transfer.count_cycles(motion) else _transfer_gesture
     paths, fit, notes = _fit_legs(body, motion, transfer)
@@ -235,7 +236,7 @@ def _fit_legs(body: Body, motion: Motion, transfer: Callable) -> tuple[Paths, _F
         transfer: makes the paths, of a size; see `gait_transfer.transfer`.
 
     Raises:
-        ValueError: legs do not reach the paths.
+        ValueError: legs do not reach the paths, or do not close the loop.
     """
     least_excess = math.inf
     worst_miss = ""
@@ -248,13 +249,16 @@ def _fit_legs(body: Body, motion: Motion, transfer: Callable) -> tuple[Paths, _F
             fit = _Search.along(body, shifted_paths.select(few_frames)).solve_frames()
             if (fit.misses <= max_misses).all():
                 fit = _Search.along(body, shifted_paths).follow_frames(motion.loops)
-            if (fit.misses <= max_misses).all():
-                return shifted_paths, fit, notes + _describe_changes(size, rise)
             excesses = (fit.misses - max_misses).max(axis=0)
+            is_open = motion.loops and abs(fit.angles[-1] - fit.angles[0]).max() > MAX_SEAM
+            if (excesses <= 0.0).all() and not is_open:
+                return shifted_paths, fit, notes + _describe_changes(size, rise)
             if excesses.max() < least_excess:
                 least_excess = excesses.max()
                 leg = int(excesses.argmax())
                 worst_miss = f"{body.legs[leg].name} misses its path by {fit.misses[:, leg].max():.2f} standing heights"
+                if least_excess <= 0.0:
+                    worst_miss = "its joints do not come back at the end of the loop"
     raise ValueError(f"motion {motion.name!r} of {motion.body}: {body.name} cannot follow it, {worst_miss}")
 
 

@@ -9,7 +9,7 @@ from arc_suite import motions, registry
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
 from arc_suite.models.standing import measure_standing, stability_margin
-from arc_suite.motions import gait_transfer, motion_text
+from arc_suite.motions import gait_transfer, motion_text, striding
 from arc_suite.motions.paths import Size, match_feet
 
 QUEEN = registry.body_of("queen")
@@ -49,6 +49,19 @@ def test_loop_closes_on_legs_with_four_joints():
     """Their joints drifted by up to a degree in a cycle, and a longer motion by as much in each of its steps."""
     motion, _ = motions.retarget(drawn_motions.step_loop(QUEEN), registry.body_of("random:17"))
     np.testing.assert_allclose(motion.angles[-1], motion.angles[0], atol=np.radians(0.2))
+
+
+@pytest.mark.parametrize(("source", "half_path"), [("tick", 0.21), ("tick", 0.36), ("spider", 0.36), ("queen", 0.18)])
+def test_a_loop_that_stretched_legs_leave_open_gets_a_lower_torso(source, half_path):
+    """Joints of stretched legs came back up to 2 rad elsewhere, and the loop was refused."""
+    body = registry.body_of(source)
+    gait = gait_transfer.find_gait(body)
+    velocity = 2.0 * half_path * body.torso.standing_height * 1.5 / gait.duty_factor
+    steps = striding.stride(body, 1.5, gait.duty_factor, np.array(gait.offsets), velocity)
+    motion, notes = motions.retarget(steps, registry.body_of("hound"))
+    assert any(note.startswith("the torso is lower by") for note in notes)
+    np.testing.assert_allclose(motion.angles[-1], motion.angles[0], atol=0.05)
+    assert froude(motion) == pytest.approx(froude(steps), rel=1e-6)
 
 
 def test_gesture_has_the_foot_that_stands_in_the_same_place():
