@@ -36,10 +36,10 @@ export class Swing {
   }
 
   // The turn in the frame of the part above, whose matrix in the world is given, some seconds after the last one; a time
-  // below 0 begins anew. The ground is at a height, m.
+  // below 0 begins anew, and so does a jump at the same time. The ground is at a height, m.
   follow(matrix, seconds, ground = 0) {
     const anchor = this.pivot.clone().add(this.mass).applyMatrix4(matrix);
-    if (!this.anchor || seconds < 0) this.begin(anchor);
+    if (!this.anchor || seconds < 0 || (seconds === 0 && !anchor.equals(this.anchor))) this.begin(anchor);
     else if (seconds > 0) this.advance(anchor, seconds);
     const frame = new THREE.Quaternion().setFromRotationMatrix(matrix), back = frame.clone().invert();
     const offset = this.ring[1].clone().divideScalar(this.rate).applyQuaternion(back);

@@ -412,15 +412,15 @@ def task_from_flags() -> tuple[str, dict[str, Any]]:
 
 
 def refuse_flags(names: Iterable[str], reason: str) -> None:
-    """Raise ValueError for the first of these flags that the command line has: it would have no effect.
+    """Raise ValueError for those of these flags that the command line has: they would have no effect.
 
     Args:
         names: names of flags.
         reason: what the flags go with, or what there is in place of them.
     """
-    for name in names:
-        if FLAGS[name].present:
-            raise ValueError(f"--{name}: {reason}")
+    idle_flags = [f"--{name}" for name in names if FLAGS[name].present]
+    if idle_flags:
+        raise ValueError(f"{', '.join(idle_flags)}: {reason}")
 
 
 def check_flags_suit_file(extension: str, extensions_of_flags: Mapping[str, Iterable[str]]) -> None:

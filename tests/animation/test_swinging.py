@@ -125,6 +125,7 @@ def test_pages_swing_bones_as_python_does(tmp_path):
         poses[:, 3:7] += 0.05 * random.normal(size=(300, 4)).cumsum(axis=0)  # it tumbles
         poses[:, 3:7] /= np.linalg.norm(poses[:, 3:7], axis=-1, keepdims=True)
         times = random.uniform(0.001, 0.05, len(poses)).cumsum()
+        times[201] = times[200]  # a jump, from which bones begin anew
         bones = swinging.Swinging(swinging.list_bones(body))
         ground = 0.5 * body.torso.standing_height
         arena = types.SimpleNamespace(height=lambda x, y, ground=ground: ground)

@@ -101,7 +101,8 @@ OTHERS |= {
     "study samples-mine.search": "study 'samples-mine.search': it is a folder; did you mean samples-mine:search?\n",
     "studio --host=[::1]:9000": "--host=[::1]:9000: expected a host alone; did you mean --host=::1 --port=9000?\n",
     "studio --host=[::1]": "--host=[::1]: expected a host alone; did you mean --host=::1?\n",
-    "studio --port=[::1]:9000": "[1, 65535]; did you mean --host=::1 --port=9000?\n",
+    "studio --port=[::1]:9000": "flag --port=[::1]:9000: expected an integer in the range [1, 65535]; did you mean "
+    "--host=::1 --port=9000?\n",
     "studio --host=:9000": "--host=:9000: expected a host alone; did you mean --port=9000?\n",
     "studio --host=9000": "--host=9000: expected a host alone; did you mean --port=9000?\n",
     "studio --host=*": "--host=*: expected a host alone; did you mean --host=0.0.0.0?\n",
