@@ -352,7 +352,8 @@ def write_gif(path: Path | IO[bytes], frames: Iterable[np.ndarray], seconds: flo
     # Of Pillow's methods, the octree alone keeps small bright spots, such as eyes and glows.
     palette = Image.fromarray(np.concatenate(samples)).quantize(_GIF_COLORS, Image.Quantize.FASTOCTREE)
     images = [Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
-    durations = _durations(len(frames), seconds, unit=10)
+    min_duration = round(1000.0 * _MIN_FRAME_SECONDS)  # ms: rounding alone would make some frames shorter
+    durations = [max(duration, min_duration) for duration in _durations(len(frames), seconds, unit=10)]
     images[0].save(path, "GIF", save_all=True, append_images=images[1:], duration=durations, loop=0)
 
 

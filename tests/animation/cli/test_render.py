@@ -123,6 +123,19 @@ def test_a_film_keeps_the_sum_of_frames_between_the_units_of_its_format(tmp_path
     assert (film.n_frames, total, film.info["loop"]) == (20, milliseconds, 0)
 
 
+def test_no_frame_of_a_gif_is_shorter_than_players_show(tmp_path):
+    """A clip of 37/30 s at 50 frames a second: 62 frames of 19.9 ms, some of which were rounded to 10 ms."""
+    frames = np.zeros((62, 8, 62, 3), np.uint8)
+    frames[range(62), 4, range(62)] = 255
+    films.write_gif(tmp_path / "a.gif", frames, 37 / 30 / 62)
+    with Image.open(tmp_path / "a.gif") as film:
+        durations = []
+        for i in range(film.n_frames):
+            film.seek(i)
+            durations.append(film.info["duration"])
+    assert durations == [20] * 62
+
+
 @pytest.mark.long
 def test_a_loop_holds_whole_cycles_at_any_frames_a_second(tmp_path):
     """Leaper's gait of 1.2 Hz: of 20 steps one cycle, 5 / 6 s, is the nearest; its last frame leads to the first."""
