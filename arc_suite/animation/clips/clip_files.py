@@ -46,6 +46,7 @@ DEFAULT_DIRECTIONS = 8  # of a sheet
 # Suffixes of the JSON files next to files. A spec of the same name, .json, stays as it is.
 _METRICS_SUFFIXES = {GLB_EXTENSION: ".clips.json", SHEET_EXTENSION: ".sprites.json"}
 _SEVERAL_CLIPS = (GLB_EXTENSION, SHEET_EXTENSION)  # files that hold them
+_DEFAULTS_OF_RECORDINGS = {"weight": 1.0, "straight": False, "plant": False, "preset": None}
 _MAX_SHEET_SIZE = 16384  # pixels, width and height
 _BLENDER_EXTENSIONS = (".fbx", ".bvh", ".blend")  # of the files that tools/to_fbx.py writes
 
@@ -84,7 +85,7 @@ def animate(
             A number may be None, for its default.
 
     Raises:
-        ValueError: an option that does not suit the file, or as `clips.clips`.
+        ValueError: an option that does not suit the file or any of the clips, or as `clips.clips`.
         OSError: a file that cannot be read or written.
         RenderingUnavailable: pictures, and no OpenGL here.
     """
@@ -94,6 +95,8 @@ def animate(
     extension = _check_arguments(path, names, fps, options)
     options = {name: value for name, value in options.items() if value is not None}
     clip_options: dict[str, Any] = {"weight": weight, "straight": straight, "plant": plant}
+    if names and all(map(_is_motion, names)):
+        _refuse_idle_options(names, clip_options | {"preset": preset})
     recording_progress = functools.partial(progress, desc="recording", unit="clip", leave=False)
     with files.writing(path) as temporary, files.writing_json(metrics_file(path)) as metrics:
         names = catalog.clip_names() if names == [ALL] else names
@@ -111,6 +114,13 @@ def animate(
         else:
             _write_motion_or_film(temporary, extension, setup.body, made_clips[0], progress, **options)
     return made_clips
+
+
+def _refuse_idle_options(names: Sequence[str], options: Mapping[str, Any]) -> None:
+    """Raise a ValueError for the first option that has no effect on files of motions, of which all names are."""
+    for option, value in options.items():
+        if value != _DEFAULTS_OF_RECORDINGS[option]:
+            raise ValueError(f"{option}: it has no effect on {names[0]}, a motion; leave it out")
 
 
 def _write_motion_or_film(temporary: Path, extension: str, body: Body, clip: Clip, progress, **options) -> None:

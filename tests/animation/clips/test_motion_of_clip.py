@@ -109,3 +109,15 @@ def test_root_of_a_loop_of_whole_turns_stays_near_the_torso(turns, radius):
     assert abs(clip.positions[:, :2]).max() < 0.02
     np.testing.assert_allclose(clip.positions[-1], clip.positions[0], atol=1e-12)
     np.testing.assert_allclose(clip.poses()[:, :3], motion.positions, atol=1e-12)
+
+
+@pytest.mark.parametrize("option", [{"plant": True}, {"straight": True}, {"weight": "heavy"}, {"preset": "tuned"}])
+def test_options_of_recorded_clips_are_refused_where_all_clips_are_motions(option, tmp_path):
+    tick = registry.body_of("tick")
+    file = str(tmp_path / "steps.npz")
+    motions.save(drawn_motions.step_loop(tick), file)
+    (name,) = option
+    with pytest.raises(ValueError, match=f"^{name}: it has no effect on {file}, a motion; leave it out$"):
+        animation.animate(tick, tmp_path / "steps.glb", file, **option)
+    assert not (tmp_path / "steps.glb").exists()
+    animation.animate(tick, tmp_path / "steps.glb", file, weight=1, plant=False)
