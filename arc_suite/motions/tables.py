@@ -34,7 +34,8 @@ def read_csv(path: str | os.PathLike[str], body: Body, rate: float | None, loops
     """Read a table of frames, and return it with a line for each thing that was changed.
 
     Columns are `x`, `y`, `z`, `qw`, `qx`, `qy`, `qz` of the root and the joints' names; with `time`, s, also at an
-    uneven rate. Without a line of names the columns are x, y, z, qx, qy, qz, qw and the joints in the body's order.
+    uneven rate. Joints of an imported robot may have their names of its file. Without a line of names the columns are
+    x, y, z, qx, qy, qz, qw and the joints in the body's order.
 
     Args:
         path: path of the file.
@@ -69,7 +70,7 @@ def read_arrays(
     with parsers.guard(f"{path}"):
         names = body.joint_names
         if _NAMES_ARRAY in arrays:
-            names = tuple([str(name) for name in arrays[_NAMES_ARRAY].ravel()])
+            names = _name_as_body(body, [str(name) for name in arrays[_NAMES_ARRAY].ravel()])
         if _ANGLES_ARRAY not in arrays:
             if "policy" in arrays:
                 raise ValueError("expected a motion, got a policy, which arc-suite render and arc-suite view show")
@@ -102,7 +103,7 @@ def _read_columns(text: str, body: Body) -> dict[str, np.ndarray]:
     names = [*_POSITION, *_QUATERNION[1:], _QUATERNION[0], *body.joint_names]
     first_frame = 0  # index of its line
     if not _is_number(first_words[0]):
-        names = first_words
+        names = _name_as_body(body, first_words)
         first_frame = 1
     frames = []
     for number, line in enumerate(lines[first_frame:], start=first_frame + 1):
@@ -112,6 +113,12 @@ def _read_columns(text: str, body: Body) -> dict[str, np.ndarray]:
     if len(columns) < len(names):
         raise ValueError("expected each column once")
     return columns
+
+
+def _name_as_body(body: Body, names: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of columns, with a body's names of joints in place of those in the file of an imported one."""
+    joint_of_alias = {joint.alias: name for name, joint in zip(body.joint_names, body.joints, strict=True)}
+    return tuple([name if name in body.joint_names else joint_of_alias.get(name, name) for name in names])
 
 
 def _stack_columns(body: Body, columns: dict[str, np.ndarray]) -> np.ndarray:

@@ -162,6 +162,7 @@ def test_csv_of_a_robot(robot, tmp_path):
     qpos, joints = qpos_of(robot, steps)
     path = tmp_path / "steps.csv"
     names = ["x", "y", "z", "qw", "qx", "qy", "qz", *robot.joint_names]
+    own_names = [*names[:7], *[joint.alias for joint in robot.joints]]
     table = np.concatenate([qpos[:, :7], qpos[:, joints]], axis=-1)
     order = np.random.default_rng(1).permutation(len(names))
     lines = [",".join(np.array(names)[order]), *[",".join(map(repr, row[order].tolist())) for row in table]]
@@ -173,6 +174,9 @@ def test_csv_of_a_robot(robot, tmp_path):
     assert_same(motion, steps)
     timed = [f"time,{lines[0]}", *[f"{0.05 * index:.3f},{line}" for index, line in enumerate(lines[1:])]]
     path.write_text("\n".join(timed))
+    assert_same(reading.read(path, robot)[0], steps)
+    # Names of the robot's file.
+    path.write_text(path.read_text().replace(",".join(np.array(names)[order]), ",".join(np.array(own_names)[order])))
     assert_same(reading.read(path, robot)[0], steps)
     # Without names: w of the quaternion is last.
     columns = [*range(3), 4, 5, 6, 3, *range(7, len(names))]
@@ -190,6 +194,11 @@ def test_arrays_of_a_robot(robot, tmp_path):
         "body_quat_w": np.tile(qpos[:, None, 3:7], (1, 13, 1)),
     }
     np.savez(tmp_path / "steps.npz", **arrays)
+    assert_same(reading.read(tmp_path / "steps.npz", robot)[0], steps)
+    own_names = np.array([joint.alias for joint in robot.joints])
+    order = np.random.default_rng(1).permutation(len(own_names))
+    mixed = arrays | {"joint_pos": arrays["joint_pos"][:, order], "joint_names": own_names[order]}
+    np.savez(tmp_path / "steps.npz", **mixed)
     assert_same(reading.read(tmp_path / "steps.npz", robot)[0], steps)
     np.savez(tmp_path / "steps.npz", **arrays, joint_names=np.array(["a"] * 12))
     with pytest.raises(ValueError, match="columns: expected those of .*, and there is no l1_joint1"):
