@@ -46,7 +46,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
     """Learn; see `arc_suite.learning.agents`.
 
     Raises:
-        ValueError: the body has no such preset, or the run is too short to learn.
+        ValueError: the body has no such preset, or the run or its episodes are too short to learn.
     """
     environment = _open_environment(context, hp.num_envs)
     architecture = architectures.of_environment(environment)
@@ -136,6 +136,13 @@ def _open_environment(context: RunContext, num_envs: int):
     return context._replace(training=training).environment(num_envs)
 
 
+def _shortest_step_limit(environment: VectorEnv | BodiesEnv) -> float:
+    """Return the fewest control steps of a time limit, may be infinite; each body and task has its own."""
+    if isinstance(environment, BodiesEnv):
+        return min(task.step_limit for task in environment.tasks)
+    return environment.task.definition.step_limit
+
+
 class _Collector:
     """Acts in the environments, and keeps all observations and labels of the run.
 
@@ -160,6 +167,11 @@ class _Collector:
         if length <= hp.left_out:
             reason = f"as the first {hp.left_out} control steps of an episode are not learned from"
             raise ValueError(f"steps: expected more than {hp.left_out * hp.num_envs}, {reason}, got {context.steps}")
+        shortest = _shortest_step_limit(environment)
+        if shortest <= hp.left_out:
+            raise ValueError(
+                f"left_out: expected fewer than the {shortest:.0f} control steps of an episode, got {hp.left_out}"
+            )
         self._dataset = {
             "observations": np.zeros((length, hp.num_envs, architecture.size), np.float32),
             "labels": np.zeros((length, hp.num_envs, architecture.joints), np.float32),

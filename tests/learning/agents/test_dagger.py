@@ -69,6 +69,15 @@ def test_a_run_too_short_to_learn_from_is_refused(begun):
         begun(steps=16).advance()
 
 
+@pytest.mark.parametrize("robot", ["leaper", "leaper,tick"])
+def test_episodes_too_short_to_learn_from_are_refused(begun, robot):
+    """Without the refusal such a run makes no update and says nothing."""
+    settings = {"robot": robot, "time_limit": 0.5, "steps": 320}
+    with pytest.raises(ValueError, match=r"^left_out: expected fewer than the 10 control steps of an episode, got 10$"):
+        begun(changes={"left_out": 10}, **settings).advance()
+    assert int(begun(changes={"left_out": 9}, **settings).until(320).checkpoint["state/moments/count"])
+
+
 def test_any_number_of_updates_is_made(begun):
     """Also one that no whole number of compiled calls makes."""
     agent = begun(changes={"updates": dagger.UPDATES_PER_CALL + 3, "last_updates": 7, "round": 15})
