@@ -233,17 +233,21 @@ class Setup:
         return Setup._make(self.domain, self.task, settings | dict(changes))
 
     def learning(self) -> "Setup":
-        """Return the setup to learn in: with the settings that the task has for training, unless they are set.
+        """Return the setup to learn in: with the settings of `training_settings`, unless they are set.
 
-        Several tasks have those in which all of them agree. Policies are judged in the setup itself.
+        Policies are judged in the setup itself.
         """
+        return self.with_settings({**self.training_settings, **self.task_kwargs})
+
+    @property
+    def training_settings(self) -> dict[str, Any]:
+        """Settings that the task has for training alone; several tasks have those in which all of them agree."""
         tasks = registry.tasks_of(self.task)
-        settings = {
+        return {
             name: value
             for name, value in self.kind.training.items()
             if all(task.training.get(name) == value for task in tasks)
         }
-        return self.with_settings({**settings, **self.task_kwargs})
 
     def validation(self, count: int) -> "Setup":
         """Return the setup for evaluations of a policy while it learns.

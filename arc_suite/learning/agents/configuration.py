@@ -115,7 +115,7 @@ class Configuration:
         evaluate_every = checks.integer("evaluate_every", evaluate_every, 1)
         if not isinstance(prior, str | None):
             raise ValueError(f"prior: expected the id of a dataset, got {checks.preview(prior)}")
-        training = {**setup.kind.training, **checks.mapping("training", training)}
+        training = {**setup.training_settings, **checks.mapping("training", training)}
         _check_training(setup, definition, training)
         return cls(
             setup=setup,
@@ -244,9 +244,7 @@ class Configuration:
         if "arena" in settings:
             words.append(f"--arena={settings.pop('arena')}")
         words += _flags("set", settings)
-        of_task = self.setup.kind.training
-        changed_training = {name: value for name, value in self.training.items() if of_task.get(name) != value}
-        words += _flags("train_set", changed_training)
+        words += _flags("train_set", _changed_training(self.setup, self.training))
         words += _flags("hp", changes)
         return shlex.join(words)
 
@@ -432,12 +430,20 @@ def _check_training(setup: Setup, definition: algorithms.Algorithm, training: Ma
             f"setting {CURRICULUM}: expected among the settings of training (--train_set), as an evaluation "
             f"would begin at the first level, got {checks.preview(curriculum)}"
         )
-    if training and not definition.acts:
-        raise ValueError(f"training: expected no settings, as the algorithm makes no step, got {', '.join(training)}")
+    changed_names = _changed_training(setup, training)
+    if changed_names and not definition.acts:
+        names = ", ".join(changed_names)
+        raise ValueError(f"training: expected no settings, as the algorithm makes no step, got {names}")
     for name in training:
         if name in ("random", "exclude_blocks"):
             reason = "as every run has a seed" if name == "random" else "as it is a hyperparameter"
             raise ValueError(f"training: setting {name}: expected none, {reason}, got {checks.preview(training[name])}")
+
+
+def _changed_training(setup: Setup, training: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings of training, by name, that differ from those that the task itself has for training."""
+    of_task = setup.training_settings
+    return {name: value for name, value in training.items() if of_task.get(name) != value}
 
 
 def apply_training(policy_setup: Setup, training: Mapping[str, Any]) -> Setup:

@@ -9,6 +9,9 @@ from conftest import SHORT, learning
 
 from arc_suite import data
 from arc_suite.envs.setup import Setup
+from arc_suite.learning.agents.configuration import Configuration
+
+SMALL_NETWORK = {"hidden": 32, "batch": 64}
 
 
 @pytest.fixture
@@ -17,7 +20,7 @@ def begun(tmp_path):
 
     def begin(prior, **context):
         setup = Setup.of("tick", "walk", SHORT)
-        return learning("bc", {"hidden": 32, "batch": 64}, tmp_path / "run", setup, 1000, 1000, prior=prior, **context)
+        return learning("bc", SMALL_NETWORK, tmp_path / "run", setup, 1000, 1000, prior=prior, **context)
 
     return begin
 
@@ -57,3 +60,18 @@ def test_without_a_dataset_it_says_what_it_takes(begun):
         ValueError, match=r"^prior: the algorithm needs the id of a dataset, which arc-suite collect makes, got None$"
     ):
         begun(None).advance()
+
+
+def test_it_learns_where_a_task_has_settings_of_training(tmp_path, monkeypatch):
+    """Those of `recover` are no settings of the caller, also in the record of a run."""
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    setup = Setup.of("tick", "recover")
+    collected = data.DatasetSettings(setup.learning(), "zero", (), steps=8)
+    data.collect("arc_suite/falls-v0", collected, 2, threads=1)
+    run = Configuration.of(setup, "bc", SMALL_NETWORK, steps=4, evaluate_every=4, prior="arc_suite/falls-v0")
+    assert Configuration.from_dict(run.to_dict()) == run
+    assert "--train_set" not in run.command
+    agent = learning("bc", SMALL_NETWORK, tmp_path / "run", setup, 4, 4, prior="arc_suite/falls-v0")
+    assert agent.advance().metrics["error"] >= 0.0
+    with pytest.raises(ValueError, match="^training: expected no settings, as the algorithm makes no step, got kicks$"):
+        Configuration.of(setup, "bc", training={"kicks": 1.0})
