@@ -8,13 +8,31 @@ import numpy as np
 
 from arc_suite import rotations
 
+_MAX_SLOPE = 0.7  # sine of the angle of the forward axis to the horizontal, up to which yaw follows its turns
 _MAX_ARC_TURN = 1.5 * np.pi  # rad, up to which the ends of a path say its twist: those of a whole turn lie together
 
 
 def ground_poses(poses) -> np.ndarray:
     """Return the ground poses (samples, 3) of the torso in poses (samples, 7 + joints); yaw does not jump."""
-    yaw = np.unwrap(rotations.yaw(poses[:, 3:7]))
-    return np.concatenate([poses[:, :2], yaw[:, None]], axis=-1)
+    return np.concatenate([poses[:, :2], find_headings(poses[:, 3:7])[:, None]], axis=-1)
+
+
+def find_headings(quaternions) -> np.ndarray:
+    """Return the yaw (samples,) of orientations (samples, 4) that follow each other; it does not jump by whole turns.
+
+    While the forward axis is steep, as in a somersault, yaw itself may jump by half a turn. There, the turns about the
+    vertical count.
+    """
+    yaw = np.unwrap(rotations.yaw(quaternions))
+    is_steep = abs(rotations.matrix(quaternions)[:, 2, 0]) > _MAX_SLOPE
+    if not is_steep.any():
+        return yaw
+    turns = rotations.product(quaternions[1:], rotations.inverse(quaternions[:-1]))  # in the world
+    turns_about_vertical = 2.0 * np.arctan2(turns[:, 3], turns[:, 0])
+    turns_about_vertical = rotations.wrap_angle(turns_about_vertical)  # q and -q are one rotation
+    steps = np.where(is_steep[1:] | is_steep[:-1], turns_about_vertical, np.diff(yaw))
+    expected_yaw = yaw[0] + np.concatenate([np.zeros(1), np.cumsum(steps)])
+    return yaw + 2.0 * np.pi * np.round((expected_yaw - yaw) / (2.0 * np.pi))
 
 
 def relative_pose(origin, ground_pose) -> np.ndarray:

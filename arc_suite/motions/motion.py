@@ -7,6 +7,7 @@ import numpy as np
 from arc_suite import checks, rotations
 from arc_suite.models.kinematics import Legs
 from arc_suite.models.posture import find_rest_pose
+from arc_suite.motions.ground_poses import find_headings
 from arc_suite.robots import mirror as mirrors
 from arc_suite.robots.spec import Body
 
@@ -75,7 +76,7 @@ class Motion(NamedTuple):
     @property
     def displacement(self) -> np.ndarray:
         """Displacement (3,) of the torso from the first frame to the last: forward and left, m, and turn, rad."""
-        headings = np.unwrap(rotations.yaw(self.quaternions))
+        headings = find_headings(self.quaternions)
         shift = self.positions[-1, :2] - self.positions[0, :2]
         return np.append(rotations.to_heading_frame(shift, headings[0]), headings[-1] - headings[0])
 

@@ -130,6 +130,18 @@ def test_a_loop_that_turns_over_goes_on(axis):
         assert np.degrees(2.0 * np.arccos(cosines)).max() < 0.01
 
 
+@pytest.mark.parametrize("lean", [0.0, 0.02, -0.02])
+@pytest.mark.parametrize("turn", [0.0, 1.0, -5.0])
+def test_a_somersault_is_no_turn(lean, turn):
+    """Where the forward axis passes the vertical, yaw jumps by half a turn, to either side."""
+    somersault = turn_over(1)
+    share = np.linspace(0.0, 1.0, somersault.frames)
+    leaning = rotations.product(np.array((np.cos(lean / 2), np.sin(lean / 2), 0.0, 0.0)), somersault.quaternions)
+    turning = rotations.turn_about_z(leaning, turn * share)
+    motion = motions.make(TICK, "flip", 60.0, True, somersault.positions, turning, somersault.angles)
+    np.testing.assert_allclose(motion.displacement, (0.0, 0.0, turn), atol=1e-9)
+
+
 def test_no_frames_and_no_rate_are_one_line():
     for stop in (0, -1):
         for loops in (True, False):

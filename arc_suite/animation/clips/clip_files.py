@@ -95,8 +95,7 @@ def animate(
     extension = _check_arguments(path, names, fps, options)
     options = {name: value for name, value in options.items() if value is not None}
     clip_options: dict[str, Any] = {"weight": weight, "straight": straight, "plant": plant}
-    if names and all(map(_is_motion, names)):
-        _refuse_idle_options(names, clip_options | {"preset": preset})
+    _refuse_idle_options(names, clip_options | {"preset": preset})
     recording_progress = functools.partial(progress, desc="recording", unit="clip", leave=False)
     with files.writing(path) as temporary, files.writing_json(metrics_file(path)) as metrics:
         names = catalog.clip_names() if names == [ALL] else names
@@ -117,7 +116,9 @@ def animate(
 
 
 def _refuse_idle_options(names: Sequence[str], options: Mapping[str, Any]) -> None:
-    """Raise a ValueError for the first option that has no effect on files of motions, of which all names are."""
+    """Raise a ValueError for the first option that has no effect on files of motions, if all names are such files."""
+    if not names or not all(map(_is_motion, names)):
+        return
     for option, value in options.items():
         if value != _DEFAULTS_OF_RECORDINGS[option]:
             raise ValueError(f"{option}: it has no effect on {names[0]}, a motion; leave it out")
