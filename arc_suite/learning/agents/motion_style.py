@@ -19,6 +19,8 @@ from arc_suite.learning.agents import networks
 from arc_suite.models.standing import GRAVITY
 from arc_suite.motions import check_body, motion_text
 from arc_suite.tasks import Task
+from arc_suite.tasks.modified_task import has_active
+from arc_suite.tasks.modifiers import SensorsOnly
 from arc_suite.tasks.motion_tables import MotionTables
 from arc_suite.tasks.terms import greatest
 
@@ -74,16 +76,21 @@ class MotionStyle(NamedTuple):
             both_sides: whether the mirror image of the motion is as good.
 
         Raises:
-            ValueError: no motion, or one of another body.
+            ValueError: no motion, or one of another body, or observations without poses.
             OSError: the file cannot be read.
         """
+        if "posture" not in task.sizes:
+            reason = "as poses are read from it; see exclude_blocks"
+            raise ValueError(f"style: expected the block posture, {reason}, got {', '.join(task.sizes)}")
         body = task.scene.body
         body_motion = motion_text.read(motion)
         check_body(body_motion, body)
         height = body.torso.standing_height
         timestep = task.scene.control_timestep / _SUBSTEPS
         tables = MotionTables.of(body, [body_motion], timestep, math.sqrt(GRAVITY / height))
-        poses = _describe(tables.heights, tables.quaternions, tables.angles, height)
+        # In place of the height, which no sensor gives, observations have 0.
+        heights = np.zeros_like(tables.heights) if has_active(task, SensorsOnly) else tables.heights
+        poses = _describe(heights, tables.quaternions, tables.angles, height)
         starts = [0, tables.mirror_offset] if both_sides and tables.mirror_offset else [0]
         cycles = [poses[start : start + tables.counts[0]] for start in starts]
         pairs = np.concatenate([pair_poses(cycle, np.roll(cycle, -_SUBSTEPS, axis=0)) for cycle in cycles])

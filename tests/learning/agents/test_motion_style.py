@@ -58,6 +58,28 @@ def test_mirror_images_of_poses_are_as_good_where_both_sides_are_alike(motion):
     assert len(both_sides.pairs) == 2 * len(one_side.pairs)
 
 
+def test_a_discriminator_does_not_tell_poses_by_the_height_that_no_sensor_gives(motion):
+    """Observations have 0 in place of the height; so have the poses of the motion."""
+    environment = Setup.of("tick", "steer", {"sensors_only": True}).make_vec(2, seed=0)
+    task = environment.task.definition
+    style = MotionStyle.of(task, motion, share=0.4, both_sides=False)
+    seen_heights = style.poses(task, environment.reset()[0])[:, 0]
+    pairs = style.pairs * style.scale + style.mean
+    numbers = pairs.shape[-1] // 2
+    assert_array_equal(seen_heights, 0.0)
+    assert_array_equal(pairs[:, [0, numbers]], 0.0)
+    assert abs(pairs[:, 3] - 1.0).max() < 0.1  # the vertical stays
+
+
+@pytest.mark.parametrize(
+    ("settings", "changes"), [({}, {"exclude_blocks": ["posture"]}), ({"exclude_blocks": ["posture"]}, {})]
+)
+def test_observations_without_poses_are_refused(motion, tmp_path, settings, changes):
+    changes = CHANGES | {"style": motion} | changes
+    with refused("style: expected the block posture, as poses are read from it; see exclude_blocks, got ", begins=True):
+        learning("ppo", changes, tmp_path, setup=Setup.of("tick", "steer", settings), steps=64).advance()
+
+
 def test_a_run_with_a_style_resumes_bit_exactly_and_its_policy_has_no_discriminator(motion, tmp_path):
     whole = styled(motion, tmp_path)
     first = styled(motion, tmp_path)
