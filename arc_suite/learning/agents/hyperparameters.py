@@ -333,11 +333,23 @@ class ProximalPolicy:
         checks.name(self.simulation, ("mujoco", "mjx", "warp"), "simulation")
         object.__setattr__(self, "style", motion_text.embed(self.style))  # a run holds its motion, as settings do
         registry.find_entry("network", self.network, NETWORKS)
-        transitions = self.num_envs * self.horizon
-        if self.symmetry_augmentation and self.network == "perceptron":
-            transitions *= 2  # each has a mirrored copy
+        self.check_minibatch(has_copies=self.symmetry_augmentation and self.network != "legs")
+
+    def check_minibatch(self, has_copies: bool) -> None:
+        """Check that the transitions of a horizon fill a minibatch.
+
+        Args:
+            has_copies: whether each transition has a mirrored copy. It has none of an asymmetric body, or if the
+                network treats left and right alike.
+
+        Raises:
+            ValueError: they are too few.
+        """
+        transitions = (1 + has_copies) * self.num_envs * self.horizon
         if self.minibatch > transitions:
-            raise ValueError(f"minibatch: expected at most the transitions of a horizon, got {self.minibatch}")
+            copies = ", mirrored copies counted" if has_copies else ""
+            expected = f"at most the {transitions} transitions of a horizon{copies}"
+            raise ValueError(f"minibatch: expected {expected}, got {self.minibatch}")
 
 
 def _check_numbers(hp, ranges: Mapping[str, tuple]) -> None:

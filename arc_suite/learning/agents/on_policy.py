@@ -154,10 +154,16 @@ def begin(hp: ProximalPolicy, context: RunContext, task: Task, architecture: Arc
 
 
 def mirror_maps(hp: ProximalPolicy, task: Task, architecture: Architecture) -> Symmetry | None:
-    """Return the mirror maps that double the transitions of a horizon; None if they stay as they are."""
+    """Return the mirror maps that double the transitions of a horizon; None if they stay as they are.
+
+    Raises:
+        ValueError: these transitions do not fill a minibatch.
+    """
+    symmetry = None
     if hp.symmetry_augmentation and not architecture.symmetric:
-        return critic_blocks.mirror_maps(task, hp.critic_blocks)
-    return None
+        symmetry = critic_blocks.mirror_maps(task, hp.critic_blocks)
+    hp.check_minibatch(has_copies=symmetry is not None)
+    return symmetry
 
 
 def update_moments(architecture: Architecture, symmetry: Symmetry | None, moments: Moments, observations) -> Moments:

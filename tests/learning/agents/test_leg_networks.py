@@ -163,7 +163,7 @@ def test_a_file_of_a_run_is_read_without_the_policy_that_it_started_from(tmp_pat
 def test_a_network_is_one_of_two():
     with refused("unknown network 'leg'; did you mean 'legs'? (there are: perceptron, legs, module:name to import it)"):
         ProximalPolicy(network="leg")
-    with refused("minibatch: expected at most the transitions of a horizon, got 4096"):
+    with refused("minibatch: expected at most the 2048 transitions of a horizon, got 4096"):
         ProximalPolicy(network="legs", minibatch=4096)
     assert dataclasses.replace(ProximalPolicy(), minibatch=4096).network == "perceptron"
 

@@ -7,6 +7,7 @@ import pytest
 pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 
 import programs
+from conftest import learning
 from interpreters import ROOT
 from refusals import refused
 
@@ -70,6 +71,14 @@ def test_networks_of_equal_sizes_are_different_values(networks):
     task = Setup.of("tick").definition
     half, whole = architectures.of(task, "half"), architectures.of(task)
     assert half != whole and half == architectures.of(task, "half")
+
+
+def test_mirrored_copies_fill_a_minibatch(networks, tmp_path):
+    """Transitions are doubled for a network that does not treat left and right alike, such as that of a package."""
+    networks.update(half=Half.of)
+    changes = {"network": "half", "num_envs": 2, "horizon": 4, "minibatch": 16, "hidden": 8}
+    agent = learning("ppo", changes, tmp_path, Setup.of("tick"), steps=8, evaluate_every=8)
+    assert int(agent.advance().checkpoint["state/moments/0/count"]) == agent.hp.epochs
 
 
 def test_names_of_the_suite_stay_its_own(networks):

@@ -25,6 +25,7 @@ from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.normalizer import Moments
 from arc_suite.learning.agents.training import train
 from arc_suite.policies import network
+from arc_suite.robots import ROBOTS
 from arc_suite.tasks import command
 
 CHANGES = {"num_envs": 4, "horizon": 8, "minibatch": 16, "epochs": 2, "hidden": 16, "network": "perceptron"}
@@ -325,10 +326,22 @@ def test_a_start_that_does_not_fit_is_refused_in_one_line(begun, tmp_path, imita
 
 
 def test_hyperparameters_that_do_not_fit_are_refused():
-    with pytest.raises(ValueError, match=r"^minibatch: expected at most the transitions of a horizon, got 65$"):
+    with refused("minibatch: expected at most the 64 transitions of a horizon, mirrored copies counted, got 65"):
         dataclasses.replace(SMALL, minibatch=65)
     with pytest.raises(ValueError, match=r"^num_envs: "):
         dataclasses.replace(SMALL, num_envs=0)
+
+
+def test_a_minibatch_counts_mirrored_copies_that_there_are(begun):
+    """An asymmetric body has none: a minibatch of more than the transitions made no update."""
+    queen = ROBOTS["queen"]
+    first_leg = dataclasses.replace(queen.legs[0], yaw_deg=queen.legs[0].yaw_deg + 10.0)
+    asymmetric = Setup.of(dataclasses.replace(queen, legs=(first_leg, *queen.legs[1:])), "walk")
+    with refused("minibatch: expected at most the 32 transitions of a horizon, got 64"):
+        begun(changes={"minibatch": 64}, setup=asymmetric).advance()
+    for setup, minibatch in ((asymmetric, 32), (Setup.of("queen", "walk"), 64)):
+        agent = begun(changes={"minibatch": minibatch}, setup=setup)
+        assert np.isfinite(agent.advance().metrics["value_loss"])
 
 
 @pytest.mark.parametrize("steps", [100, 200, 400])
