@@ -10,7 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from arc_suite import checks, evaluation, files, registry, versions
+from arc_suite import checks, evaluation, files, registry, usage, versions
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms, run_folder
 from arc_suite.learning.agents.hyperparameters import BLOCKS_LEFT_OUT
@@ -102,6 +102,8 @@ class Configuration:
         changes = hyperparameters or {}
         definition = algorithms.algorithm(algorithm).with_hyperparameters(changes)
         start = getattr(definition.hyperparameters, "start", "")
+        if start:
+            _check_learns_from_policy(setup, algorithm, definition)
         if start and not setup.several and not set(_NETWORK_OF_START) <= changes.keys():
             definition = definition.with_hyperparameters({**network_hyperparameters(start), **changes})
         if setup.several:
@@ -420,6 +422,14 @@ def _check_learns_several(setup: Setup, name: str, definition: algorithms.Algori
     exclude_blocks = getattr(definition.hyperparameters, "exclude_blocks", ())
     if not set(exclude_blocks) <= set(BLOCKS_LEFT_OUT):
         raise ValueError(f"exclude_blocks: expected none with several bodies, got {', '.join(exclude_blocks)}")
+
+
+def _check_learns_from_policy(setup: Setup, name: str, definition: algorithms.Algorithm) -> None:
+    """Raise ValueError for the start of an algorithm that learns from nothing."""
+    if definition.source == usage.NOTHING:
+        cure = "finetune_bodies" if setup.several else "finetune"
+        got = checks.preview(definition.hyperparameters.start)
+        raise ValueError(f"start: expected none, as {name} learns from no policy; --algorithm {cure} does, got {got}")
 
 
 def _check_training(setup: Setup, definition: algorithms.Algorithm, training: Mapping[str, Any]) -> None:

@@ -40,7 +40,8 @@ def begun(tmp_path):
 
     def begin(robot="leaper", task="walk", changes=(), steps=320, **context):
         context = {"setup": Setup.of(robot, task, context.pop("settings", None)), "seed": 3} | context
-        return learning("ppo", CHANGES | dict(changes), tmp_path, steps=steps, evaluate_every=steps, **context)
+        algorithm = context.pop("algorithm", "ppo")
+        return learning(algorithm, CHANGES | dict(changes), tmp_path, steps=steps, evaluate_every=steps, **context)
 
     return begin
 
@@ -250,7 +251,8 @@ def test_schedules(begun):
 
 
 def test_it_starts_from_a_policy_with_a_warm_up_of_the_values(begun, imitated):
-    agent, start = begun(changes={"start": str(imitated), "value_warm_up": 16}), network.load(imitated)
+    changes = {"start": str(imitated), "value_warm_up": 16}
+    agent, start = begun(changes=changes, algorithm="finetune"), network.load(imitated)
     observations = np.random.default_rng(0).normal(size=(5, sum(start.blocks.values()))).astype(np.float32)
     values = None
     for _ in range(2):  # the warm-up
@@ -320,9 +322,16 @@ def test_a_start_that_does_not_fit_is_refused_in_one_line(begun, tmp_path, imita
         ("leaper", "walk", {"value_warm_up": 8}, "start: expected the folder of a run whose policy is where learning "),
     ):
         with refused(message, begins=True):
-            begun(robot, task, changes).advance()
+            begun(robot, task, changes, algorithm="finetune").advance()
     with pytest.raises(OSError, match="no such file"):
-        begun(changes={"start": str(tmp_path / "none")}).advance()
+        begun(changes={"start": str(tmp_path / "none")}, algorithm="finetune").advance()
+
+
+def test_a_start_of_a_learner_from_nothing_is_refused_with_the_learner_that_takes_it(begun):
+    for robot, name in (("leaper", "finetune"), ("leaper,tick", "finetune_bodies")):
+        message = f"start: expected none, as ppo learns from no policy; --algorithm {name} does, got 'runs/x'"
+        with refused(message):
+            begun(robot, changes={"start": "runs/x", "network": "legs"})
 
 
 def test_hyperparameters_that_do_not_fit_are_refused():
