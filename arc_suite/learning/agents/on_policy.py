@@ -8,6 +8,7 @@ at different ages, so their time limits fall on different steps. Where a step be
 observation before it stands for what follows (`VectorEnv.resampled`).
 """
 
+import contextlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -24,6 +25,7 @@ from arc_suite.learning.agents.architectures import Architecture
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import RunContext, Slice, generator
 from arc_suite.learning.agents.normalizer import Moments, Normalizer
+from arc_suite.policies.graph import Graph
 from arc_suite.policies.network import Network
 from arc_suite.tasks import Task
 from arc_suite.tasks.mirrors import Symmetry
@@ -269,10 +271,7 @@ def _read_start(hp: ProximalPolicy, context: RunContext, task, architecture: Arc
                 f"{hp.start}: a policy of {kind} for other observations than those of {task.name}: "
                 f"{name} has {policy_size} numbers, and not {task_size}"
             )
-    try:
-        normalize, policy = architectures.read_policy_graph(architecture, start_policy.graph)
-    except ValueError as error:
-        raise ValueError(f"{hp.start}: expected {error}, {hp.network}") from None
+    normalize, policy = _read_graph(hp, context, task, architecture, start_policy.graph)
     expected_policy = architecture.draw_policy(np.random.default_rng(0), hp.hidden)
     shapes = [leaf.shape for leaf in jax.tree.leaves(policy)]
     expected_shapes = [leaf.shape for leaf in jax.tree.leaves(expected_policy)]
@@ -282,6 +281,23 @@ def _read_start(hp: ProximalPolicy, context: RunContext, task, architecture: Arc
         first_bias_shape = shapes[0]  # leaves of a layer are ordered by name: bias, then weight
         raise ValueError(f"{hp.start}: expected {hp.hidden} hidden units, got {first_bias_shape[0]}")
     return normalize, policy
+
+
+def _read_graph(
+    hp: ProximalPolicy, context: RunContext, task, architecture: Architecture, graph: Graph
+) -> tuple[Normalizer, tuple]:
+    """Return the normalizer and the network of the graph of the policy that learning starts from."""
+    try:
+        return architectures.read_policy_graph(architecture, graph)
+    except ValueError as error:
+        line = f"{hp.start}: expected {error}, {hp.network}"
+    if not context.setup.several:
+        other_architecture = architectures.of(task, hp.network, hp.critic_blocks, not hp.symmetry_augmentation)
+        with contextlib.suppress(ValueError):
+            architectures.read_policy_graph(other_architecture, graph)
+            cure = f"symmetry_augmentation={str(not hp.symmetry_augmentation).lower()}"
+            line = f"{hp.start}: a policy of {cure}; add --hp {cure}"
+    raise ValueError(line)
 
 
 def _extend_normalizer(start: Normalizer, fresh: Normalizer) -> Normalizer:

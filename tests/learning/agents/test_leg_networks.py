@@ -160,6 +160,19 @@ def test_a_file_of_a_run_is_read_without_the_policy_that_it_started_from(tmp_pat
         Configuration.of(setup, "finetune", {"start": str(damaged)})
 
 
+@pytest.mark.parametrize("alike", [False, True])
+def test_a_start_of_other_symmetry_is_refused_with_the_hyperparameter_that_fits(tmp_path, alike):
+    setup, start = Setup.of("tick", "walk", {"time_limit": 0.5}), tmp_path / "start"
+    run = Configuration.of(setup, "ppo", CHANGES | {"symmetry_augmentation": alike}, steps=32, evaluate_every=32)
+    assert train(run, start)
+    changes = {name: value for name, value in CHANGES.items() if name != "hidden"} | {"start": str(start)}
+    other, cure = (changes | {"symmetry_augmentation": value} for value in (not alike, alike))
+    text = f"symmetry_augmentation={str(alike).lower()}"
+    with refused(f"{start}: a policy of {text}; add --hp {text}"):
+        learning("finetune", other, tmp_path, setup, steps=32).advance()
+    learning("finetune", cure, tmp_path, setup, steps=32).advance()
+
+
 def test_a_network_is_one_of_two():
     with refused("unknown network 'leg'; did you mean 'legs'? (there are: perceptron, legs, module:name to import it)"):
         ProximalPolicy(network="leg")
