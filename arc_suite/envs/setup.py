@@ -372,14 +372,20 @@ class Setup:
         return self.task_kwargs | {"random": seed}
 
     def __str__(self) -> str:
+        settings = self.labeled_settings
+        settings_text = f", {json.dumps(settings)}" if settings else ""
+        return f"{self._label}, {self.task_label}{settings_text}"
+
+    @property
+    def labeled_settings(self) -> dict[str, Any]:
+        """Settings for people: a ground and a motion of a file by their names, in place of their texts."""
         settings = self.task_kwargs
         arena = settings.get("arena")
         if ground_text.is_text(arena):
             settings["arena"] = ground_text.name_of(arena)
         for name in self.kind.file_settings.keys() & settings.keys():
             settings[name] = self.kind.file_settings[name].label(settings[name])
-        settings_text = f", {json.dumps(settings)}" if settings else ""
-        return f"{self._label}, {self.task_label}{settings_text}"
+        return settings
 
 
 def _validation_bodies(robot: str, count: int) -> str:

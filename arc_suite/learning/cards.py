@@ -25,6 +25,7 @@ PICTURE = "picture.png"
 _STEPS_OF_PICTURE = 40  # control steps before the picture: the walk has begun
 _SEED_OF_PICTURE = 9000  # of validation
 _SIZE_OF_PICTURE = (360, 480)  # pixels
+_MAX_COMMAND = 1000  # characters of a command that a reader copies; the text of a file takes thousands
 
 
 def write(run: Configuration, folder: Path) -> Path:
@@ -142,7 +143,8 @@ def _read_returns(folder: Path) -> tuple[np.ndarray, str]:
 def _describe(run: Configuration, folder: Path, returns: np.ndarray, episodes_text: str) -> Iterator[tuple[str, str]]:
     mean, interval = statistics.mean_and_interval([returns.tolist()])
     scale = anchors.anchors(run.validation)
-    settings = json.dumps(run.setup.task_kwargs) if run.setup.task_kwargs else "defaults"
+    labeled_settings = run.setup.labeled_settings
+    settings = json.dumps(labeled_settings) if labeled_settings else "defaults"
     yield "robot", run.setup.name
     yield "task", run.setup.kind.name
     yield "settings", f"`{_shorten(settings)}`"
@@ -182,9 +184,11 @@ def _installation_text(folder: Path) -> str:
 
 
 def _training_command(run: Configuration) -> str:
-    """Return the command that trains a run again; a body of a file is in the run's configuration."""
+    """Return the command that trains a run again: by its configuration, which holds bodies and motions of files."""
     is_body_of_file = run.setup.robot.startswith("{")
-    return "arc-suite train --config config.json -o again" if is_body_of_file else run.command
+    if is_body_of_file or len(run.command) > _MAX_COMMAND:
+        return "arc-suite train --config config.json -o again"
+    return run.command
 
 
 def _draw(run: Configuration, folder: Path) -> None:

@@ -7,16 +7,19 @@ import re
 import sys
 import types
 
+import imageio.v3 as imageio
+import numpy as np
 import programs
 import pytest
 import tiny_studies
 
 import arc_suite
-from arc_suite import learning, registry, versions
+from arc_suite import learning, motions, registry, versions
 from arc_suite.evaluation import judging
 from arc_suite.learning import cards, finals
 from arc_suite.learning.agents import configuration, run_folder
 from arc_suite.learning.agents.configuration import Configuration
+from arc_suite.motions import striding
 from arc_suite.policies import network
 from arc_suite.tasks.walk import Walk
 
@@ -66,6 +69,37 @@ def test_a_card_says_what_a_hub_and_a_reader_want(run, folder, monkeypatch):
 
 
 TICK = registry.ROBOTS["tick"]
+AGAIN = "arc-suite train --config config.json -o again"
+
+
+def test_commands_hold_no_text_of_a_file(tmp_path):
+    """The motion of a style or of `mimic`, the ground of an arena, and a body are in config.json."""
+    walk = tmp_path / "walk.npz"
+    motions.save(striding.stride(TICK, 1.5, 0.6, np.array((0.0, 0.5, 0.0, 0.5, 0.0, 0.5)), 0.3), walk)
+    hills = tmp_path / "hills.png"
+    heights = np.random.default_rng(0).integers(0, 40, size=(128, 128), dtype=np.uint8)
+    imageio.imwrite(hills, heights)
+    ground = {"arena": f"{hills}:8x8x0.1"}
+    of_files = (
+        Configuration.of(arc_suite.Setup.of("tick", "steer"), "ppo", {"style": str(walk)}),
+        Configuration.of(arc_suite.Setup.of("tick", "mimic", {"motion": str(walk)}), "ppo"),
+        Configuration.of(arc_suite.Setup.of("tick", "steer", ground), "ppo"),
+        Configuration.of(arc_suite.Setup.of(TICK.replace(name="dachs")), "ppo"),
+    )
+    assert [cards._training_command(run) for run in of_files] == [AGAIN] * len(of_files)
+    by_name = Configuration.of(arc_suite.Setup.of("tick", "mimic", {"motion": "walk"}), "ppo", seed=3)
+    assert cards._training_command(by_name) == by_name.command
+
+
+def test_a_card_names_the_motion_of_a_file(tmp_path):
+    walk = tmp_path / "walk.npz"
+    motions.save(striding.stride(TICK, 1.5, 0.6, np.array((0.0, 0.5, 0.0, 0.5, 0.0, 0.5)), 0.3), walk)
+    settings = {"motion": str(walk), "time_limit": 0.25}
+    folder = tmp_path / "run"
+    learning.train("tick", "mimic", "tiny_studies:climb", task_kwargs=settings, steps=20, folder=folder)
+    card = cards.text(configuration.read(folder / "config.json"), folder)
+    assert '| settings | `{"motion": "walk", "time_limit": 0.25}` |' in card and AGAIN in card
+    assert max(map(len, card.splitlines())) < 1000
 
 
 @pytest.mark.parametrize(

@@ -102,8 +102,7 @@ class Configuration:
         changes = hyperparameters or {}
         definition = algorithms.algorithm(algorithm).with_hyperparameters(changes)
         start = getattr(definition.hyperparameters, "start", "")
-        if start:
-            _check_learns_from_policy(setup, algorithm, definition)
+        _check_start(setup, algorithm, definition)
         if start and not setup.several and not set(_NETWORK_OF_START) <= changes.keys():
             definition = definition.with_hyperparameters({**network_hyperparameters(start), **changes})
         if setup.several:
@@ -424,12 +423,13 @@ def _check_learns_several(setup: Setup, name: str, definition: algorithms.Algori
         raise ValueError(f"exclude_blocks: expected none with several bodies, got {', '.join(exclude_blocks)}")
 
 
-def _check_learns_from_policy(setup: Setup, name: str, definition: algorithms.Algorithm) -> None:
-    """Raise ValueError for the start of an algorithm that learns from nothing."""
-    if definition.source == usage.NOTHING:
+def _check_start(setup: Setup, name: str, definition: algorithms.Algorithm) -> None:
+    """Raise ValueError for a policy to start from, where the algorithm learns from nothing."""
+    start = getattr(definition.hyperparameters, "start", "")
+    if start and definition.source == usage.NOTHING:
         cure = "finetune_bodies" if setup.several else "finetune"
-        got = checks.preview(definition.hyperparameters.start)
-        raise ValueError(f"start: expected none, as {name} learns from no policy; --algorithm {cure} does, got {got}")
+        expected = f"expected none, as {name} learns from no policy; --algorithm {cure} does"
+        raise ValueError(f"start: {expected}, got {checks.preview(start)}")
 
 
 def _check_training(setup: Setup, definition: algorithms.Algorithm, training: Mapping[str, Any]) -> None:
