@@ -17,14 +17,18 @@ from arc_suite.models.kinematics import Legs
 from arc_suite.models.posture import find_rest_pose
 from arc_suite.models.standing import measure_standing, stability_margin, time_unit
 from arc_suite.motions import gait_transfer
+from arc_suite.motions.ground_poses import find_headings, place_points, relative_points
 from arc_suite.motions.motion import MAX_SEAM, Motion, find_rest, make
 from arc_suite.motions.paths import Paths, Size, match_feet, scale_heights, shrink_turns, time_scale
+from arc_suite.motions.runs import find_runs
 from arc_suite.robots.spec import Body
 
 MAX_MISS = 0.05  # standing heights, of a foot from its path
 MAX_SLIDE = 0.15  # the same of a leg with fewer than three joints, which cannot bring its foot to every place
 
 _MIN_TRAVEL = 0.3  # standing heights over the ground, over which a foot cannot stay planted
+_MIN_TURN = math.radians(20.0)  # of the torso, over which a foot cannot stay planted
+_MIN_UPRIGHT = 0.5  # cosine of the torso's tilt, down to which it has a heading
 _MIN_MARGIN = 0.05  # standing heights, of the center of mass from the edge of the feet that carry
 _SHIFT_TIME = 1.5  # sqrt(h / g), in which the torso shifts before a foot lifts
 _BISECTIONS = 12
@@ -93,12 +97,14 @@ def _transfer_gesture(motion: Motion, body: Body, size: Size) -> tuple[Paths, li
     height = body.torso.standing_height
     rest_soles, rest_height = find_rest(body)  # m
     rest_soles = rest_soles / height
-    partners, notes = _choose_partners(motion, body, rest_soles)
-    soles, planted = _plan_soles(motion, rest_soles, partners, size)
+    headings = _find_headings(motion)
+    partners, notes = _choose_partners(motion, body, rest_soles, turns=headings.any())
+    soles, planted = _plan_soles(motion, rest_soles, partners, size, headings)
+    tilts = shrink_turns(rotations.turn_about_z(motion.quaternions, -headings), size.all * size.side)
     paths = Paths(
         seconds=motion.seconds * time_scale(motion.standing_height, height),
-        positions=_plan_torso(motion, rest_height / height, size),
-        quaternions=shrink_turns(motion.quaternions, size.all * size.side),
+        positions=_plan_torso(motion, rest_height / height, size, headings),
+        quaternions=rotations.turn_about_z(tilts, headings),
         soles=soles,
         planted=planted,
     )
@@ -106,18 +112,29 @@ def _transfer_gesture(motion: Motion, body: Body, size: Size) -> tuple[Paths, li
     return carried_paths, notes + notes_of_torso
 
 
-def _choose_partners(motion: Motion, body: Body, rest_soles: np.ndarray) -> tuple[list[int | None], list[str]]:
+def _find_headings(motion: Motion) -> np.ndarray:
+    """Return the headings (frames,) of a torso that turns and stays upright, rad; 0 for a motion without a turn."""
+    is_upright = rotations.upright(motion.quaternions).min() > _MIN_UPRIGHT
+    if not is_upright or abs(motion.displacement[2]) < _MIN_TURN:
+        return np.zeros(motion.frames)
+    return find_headings(motion.quaternions)
+
+
+def _choose_partners(
+    motion: Motion, body: Body, rest_soles: np.ndarray, turns: bool
+) -> tuple[list[int | None], list[str]]:
     """Return for each foot of a body the foot of a motion that it follows, None for one that stays planted, and notes.
 
     Args:
         motion: motion of any body.
         body: the body that is to move.
         rest_soles: (legs, 3) its soles at rest, standing heights.
+        turns: whether the motion turns.
     """
     partners = match_feet(motion.rest_soles, rest_soles)
     travel = np.linalg.norm(motion.displacement[:2]) / motion.standing_height
     flies = not motion.planted.any(axis=-1).all()
-    if travel > _MIN_TRAVEL or flies:  # feet cannot stay where they are
+    if travel > _MIN_TRAVEL or flies or turns:  # feet cannot stay where they are
         nearest = np.linalg.norm(motion.rest_soles[None] - rest_soles[:, None], axis=-1).argmin(axis=-1)
         partners = [nearest[index] if partner is None else partner for index, partner in enumerate(partners)]
     notes = []
@@ -135,7 +152,7 @@ def _choose_partners(motion: Motion, body: Body, rest_soles: np.ndarray) -> tupl
 
 
 def _plan_soles(
-    motion: Motion, rest_soles: np.ndarray, partners: list[int | None], size: Size
+    motion: Motion, rest_soles: np.ndarray, partners: list[int | None], size: Size, headings: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the paths (frames, legs, 3) of soles that follow their partners, and whether they stand (frames, legs).
 
@@ -144,25 +161,52 @@ def _plan_soles(
         rest_soles: (legs, 3) soles of the body that is to move, standing heights.
         partners: see `_choose_partners`.
         size: size of the paths.
+        headings: (frames,) of the torso, rad.
     """
     soles = np.tile(rest_soles, (motion.frames, 1, 1))
     planted = np.ones(soles.shape[:2], bool)
-    offsets = size.ahead_left_up * (motion.soles - motion.rest_soles)
+    first_offsets = size.ahead_left_up * (motion.soles[0] - motion.rest_soles)
     # Feet without a partner go with those that stand in the first frame, so that the torso is over all of them.
-    first_shift = offsets[0, motion.planted[0], :2].mean(axis=0) if motion.planted[0].any() else np.zeros(2)
+    first_shift = first_offsets[motion.planted[0], :2].mean(axis=0) if motion.planted[0].any() else np.zeros(2)
     for index, partner in enumerate(partners):
         if partner is None:
             soles[:, index, :2] += first_shift
-        else:
-            soles[:, index] += offsets[:, partner]
-            planted[:, index] = motion.planted[:, partner]
+            continue
+        planted[:, index] = motion.planted[:, partner]
+        turned_frame = np.zeros((motion.frames, 3))
+        turned_frame[:, 2] = _find_foot_headings(headings, motion.planted[:, partner])
+        offsets = relative_points(turned_frame, motion.soles[:, partner]) - motion.rest_soles[partner]
+        soles[:, index] = place_points(turned_frame, rest_soles[index] + size.ahead_left_up * offsets)
     soles[..., 2] = np.where(planted, 0.0, soles[..., 2])
     return soles, planted
 
 
-def _plan_torso(motion: Motion, rest_height: float, size: Size) -> np.ndarray:
+def _find_foot_headings(headings: np.ndarray, planted: np.ndarray) -> np.ndarray:
+    """Return the heading (frames,) of a foot, rad: that of the torso, but one alone in each stance.
+
+    Args:
+        headings: (frames,) of the torso, rad.
+        planted: (frames,) when the foot stands.
+    """
+    if not planted.any():
+        return headings
+    foot_headings = headings.copy()
+    for start, end in find_runs(planted).tolist():
+        if start == 0:
+            foot_headings[start:end] = headings[0]
+        elif end == len(headings):
+            foot_headings[start:end] = headings[-1]
+        else:
+            foot_headings[start:end] = headings[start:end].mean()
+    return np.interp(np.arange(len(headings)), np.flatnonzero(planted), foot_headings[planted])
+
+
+def _plan_torso(motion: Motion, rest_height: float, size: Size, headings: np.ndarray) -> np.ndarray:
     """Return positions (frames, 3) of the torso of a body with a height at rest, standing heights."""
-    positions = size.ahead_left_up * motion.positions / motion.standing_height
+    turned_frame = np.zeros((motion.frames, 3))
+    turned_frame[:, 2] = headings
+    ahead_left_up = size.ahead_left_up * relative_points(turned_frame, motion.positions)
+    positions = place_points(turned_frame, ahead_left_up / motion.standing_height)
     heights = scale_heights(motion.positions[:, 2] / motion.standing_height, motion.rest_height, rest_height)
     positions[:, 2] = rest_height + size.all * (heights - rest_height)
     return positions

@@ -5,7 +5,10 @@ import numpy as np
 import pytest
 
 from arc_suite import animation, motions, registry, rotations
+from arc_suite.animation.clips import turning
 from arc_suite.animation.clips.motion_of_clip import clip_of_motion
+from arc_suite.animation.clips.root_motion import Pose
+from arc_suite.models.posture import find_rest_pose
 from arc_suite.motions import reading
 
 
@@ -121,3 +124,27 @@ def test_options_of_recorded_clips_are_refused_where_all_clips_are_motions(optio
         animation.animate(tick, tmp_path / "steps.glb", file, **option)
     assert not (tmp_path / "steps.glb").exists()
     animation.animate(tick, tmp_path / "steps.glb", file, weight=1, plant=False)
+
+
+@pytest.mark.parametrize(("name", "degrees"), [("spider", 90.0), ("queen", -90.0), ("crab", 180.0)])
+def test_a_turn_on_the_spot_is_one_of_another_body(name, degrees):
+    tick = registry.body_of("tick")
+    rest = find_rest_pose(tick)
+    place = np.array((0.0, 0.0, -rest.sole_positions[:, 2].min()))
+    pose = Pose(place, np.array(rotations.NO_TURN), rest.legs.by_joint(rest.joint_angles))
+    motion = turning.turn(tick, pose, np.radians(degrees))
+    frames = round(30.0 * motion.seconds)
+    poses = motion.sample_at(np.linspace(0.0, motion.seconds, frames + 1)).poses()
+    turn = motions.make(tick, "turn", 30.0, False, poses[:, :3], poses[:, 3:7], poses[:, 7:])
+
+    body = registry.body_of(name)
+    retargeted, _ = motions.retarget(turn, body)
+    assert np.degrees(retargeted.displacement[2]) == pytest.approx(degrees, abs=0.1)
+    soles = retargeted.soles[..., :2]
+    torso = retargeted.positions[-1, :2] / retargeted.standing_height
+    last_soles = rotations.to_heading_frame(soles[-1] - torso, np.radians(degrees))
+    np.testing.assert_allclose(soles[0], retargeted.rest_soles[:, :2], atol=0.02)
+    np.testing.assert_allclose(last_soles, retargeted.rest_soles[:, :2], atol=0.02)
+    stays = retargeted.planted[1:] & retargeted.planted[:-1]
+    slides = np.linalg.norm(np.diff(soles, axis=0), axis=-1) * stays
+    assert slides.sum(axis=0).max() < 0.1
