@@ -152,9 +152,8 @@ def idle(body: Body, rest: Pose) -> ClipMotion:
     sway = np.sin(phase) * np.sin(0.5 * phase) ** 2  # at rest at both ends
     max_depth = _MAX_BREATH_SHARE * measure_belly_height(body, rest) / body.torso.standing_height
     breaths = _breathe(times, np.clip(max_depth, 0.0, _BREATH_DEPTH))
-    slide = _measure_idle_slide(body, rest, breaths)
-    if slide > _MAX_IDLE_SLIDE:
-        breaths *= _MAX_IDLE_SLIDE / slide
+    while (slide := _measure_idle_slide(body, rest, breaths)) > _MAX_IDLE_SLIDE:
+        breaths *= 0.99 * _MAX_IDLE_SLIDE / slide  # a slide shrinks less than a breath
     sways = np.zeros_like(breaths)
     sways[:, _LEFT] = _SWAY * sway
     sways[:, _ROLL] = -_SWAY_ROLL * sway
