@@ -94,6 +94,23 @@ def test_a_new_command_cuts_the_returns(monkeypatch):
     assert (before[moving] != after[moving]).any(axis=-1).all()
 
 
+def test_a_world_that_diverges_has_the_observation_before_as_the_next_one():
+    """The one after is 0, of which a network of values knows nothing."""
+    run = Configuration.of(Setup.of("leaper"), "ppo", SMALL | {"horizon": 1, "minibatch": 4, "simulation": "mjx"})
+    rollouts = world_rollouts.WorldRollouts(run.hyperparameters, [run.context(pathlib.Path())])
+    state = ppo.begin(run.hyperparameters, rollouts.architecture, np.random.default_rng(0))
+    normalize = rollouts.architecture.normalize(Moments.empty(rollouts.architecture.inputs))
+    worlds = jax.tree.map(lambda array: array[0], rollouts.begin())
+    data = worlds.state.data
+    qvel = data.qvel.at[1, 0].set(1e11)
+    worlds = worlds._replace(state=worlds.state.replace(data=data.replace(qvel=qvel)))
+    _, rollout = jax.jit(rollouts.roll_out)(worlds, state.policy, normalize, 0.01, jax.random.key(0))
+    rollout = {name: np.asarray(array)[0] for name, array in rollout.items()}
+    assert rollout["ended"][1] and not rollout["terminated"][1] and rollout["rewards"][1] == 0.0
+    is_same = (rollout["next_observations"] == rollout["observations"]).all(axis=-1)
+    assert_array_equal(is_same, [False, True, False, False])
+
+
 def contents(folder):
     """The content of a run's tables and checkpoint, without times."""
     texts = {name: (folder / f"{name}.csv").read_text() for name in ("training", "evaluations")}

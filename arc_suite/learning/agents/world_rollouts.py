@@ -113,6 +113,8 @@ class WorldRollouts:
         terminated = (state_after.done > 0.0) & (state_after.info["truncation"] == 0.0)
         has_ended = (state_after.done > 0.0) | time_is_up
         has_new_command = self.task.resampled(state_after.info["memory"]) & ~has_ended
+        # The observation after a step that diverges is 0.
+        keeps_view = has_new_command | (state_after.metrics["diverged"] > 0.0)
         transitions = {
             "observations": view,
             "actions": actions,
@@ -120,7 +122,7 @@ class WorldRollouts:
             "rewards": state_after.reward,
             "terminated": terminated,
             "ended": has_ended | has_new_command,
-            "next_observations": jnp.where(has_new_command[:, None], view, self._view(state_after)),
+            "next_observations": jnp.where(keeps_view[:, None], view, self._view(state_after)),
         }
         first_state = jax.vmap(self.env.reset)(jax.random.split(restart_key, self._hp.num_envs))
         next_state = jax.vmap(mjx.restart_at_ends)(state_after, first_state, has_ended)
