@@ -165,6 +165,8 @@ class SoftActorCritic:
             raise ValueError(f"dropout: expected 0 with {reason}, got {self.dropout}")
         checks.name(self.prior, ("none", "protected", "symmetric_sampling"), "prior")
         checks.name(self.early_stop, ("none", "published", "sign_safe"), "early_stop")
+        if self.early_stop != "none" and not self.phase_updates:
+            raise ValueError(f"early_stop: expected none without phases, phase_updates=0, got {self.early_stop}")
         # Prior data in the same buffer count towards the start steps.
         if self.buffer_size <= self.start_steps and self.prior != "protected":
             raise ValueError(

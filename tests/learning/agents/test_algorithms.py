@@ -81,6 +81,18 @@ def test_changes_that_do_not_fit(changes, line):
         algorithm("sope").with_hyperparameters(changes)
 
 
+def test_a_rule_that_ends_phases_needs_phases():
+    """Learners without them would learn the same with each rule."""
+    line = r"^early_stop: expected none without phases, phase_updates=0, got sign_safe$"
+    for name in ("sac", "sac_parallel"):
+        with pytest.raises(ValueError, match=line):
+            algorithm(name).with_hyperparameters({"early_stop": "sign_safe"})
+    with pytest.raises(ValueError, match=line.replace("sign_safe", "published")):
+        algorithm("sope").with_hyperparameters({"phase_updates": 0})
+    assert algorithm("sope").with_hyperparameters({"phase_updates": 0, "early_stop": "none"})
+    assert algorithm("sac").with_hyperparameters({"phase_updates": 10, "early_stop": "sign_safe"})
+
+
 @pytest.mark.parametrize("changes", [{"discount": 1}, {"clip": 0.0}, {"policy_rate": 1}, {"value_rate": 0}])
 def test_ppo_takes_no_whole_number_for_a_share(changes):
     with pytest.raises(ValueError, match=rf"^{next(iter(changes))}: expected a number between 0 and 1, got [01]"):
