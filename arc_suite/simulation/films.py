@@ -176,14 +176,15 @@ def cycle(footage: Footage, count: int) -> Iterator[np.ndarray]:
     """Yield views of the next whole gait cycle, evenly spaced, captioned with the gait clock's phase.
 
     Args:
-        footage: an episode whose gait clock advanced in the latest step.
+        footage: an episode whose gait clock advanced in the latest step; it rests where a command stops the body.
         count: number of views.
     """
-    while not footage.ended and not _is_nearest_to_start_of_cycle(footage):
+    advance = footage.advance
+    while not footage.ended and footage.advance and not _is_nearest_to_start_of_cycle(footage):
         footage.step()
     start = footage.steps
     for number in range(count):
-        while not footage.ended and footage.steps < start + round(number / (count * footage.advance)):
+        while not footage.ended and footage.steps < start + round(number / (count * advance)):
             footage.step()
         yield add_caption(footage.view(), f"phase {footage.phase:.2f}")
 

@@ -269,11 +269,8 @@ def drag_end(sketch: Sketch, part: str, shift: Sequence[float], symmetric: bool)
     original_ends = _original_ends(sketch)
     if part not in original_ends:
         return sketch
-    factor = sketch.scale
-    for link, link_factor in sketch.lengths:
-        if part.endswith(f"_{link}"):
-            factor = sketch.scale * link_factor
-            break
+    link_of_part = {leg.full_name(link): link.name for leg in source_body(sketch).legs for link in leg.links}
+    factor = sketch.scale * dict(sketch.lengths).get(link_of_part[part], 1.0)
     end = dict(sketch.ends).get(part, original_ends[part])
     shifted_end = tuple(coordinate + change / factor for coordinate, change in zip(end, shift, strict=True))
     return set_end(sketch, part, shifted_end, symmetric)

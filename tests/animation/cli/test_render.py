@@ -151,6 +151,25 @@ def test_a_loop_holds_whole_cycles_at_any_frames_a_second(tmp_path):
     assert 0.0 < changes[0] < 2.0 * max(changes[1:])
 
 
+@pytest.mark.parametrize("steps_to_stop", [1, 8])
+def test_a_cycle_has_its_views_though_a_command_stops_the_body_meanwhile(steps_to_stop):
+    environment = arc_suite.load("tick", "steer", {"random": 0})
+    demonstrator = policy("cpg", "tick", task=environment.task.definition)
+
+    def act_under_command(timestep):
+        is_stopped = footage.steps >= 20 + steps_to_stop
+        environment.command("command", (0.0 if is_stopped else 1.0, 0.0, 0.0))
+        return alone(demonstrator, 0)(timestep)
+
+    footage = films.Footage("tick", environment, act_under_command, "profile", (64, 48))
+    footage.view = lambda: np.zeros((48, 64, 3), np.uint8)
+    for _ in range(20):
+        footage.step()
+    assert footage.advance
+    assert len(list(films.cycle(footage, 6))) == 6
+    assert not footage.advance and footage.steps < 60
+
+
 def test_poses_between_control_steps_are_those_of_the_physics():
     environment = arc_suite.load("tick", "walk", {"random": 0})
     tuned = policy("cpg", "tick", "tuned", task=environment.task.definition)

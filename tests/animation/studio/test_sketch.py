@@ -98,6 +98,14 @@ def test_a_link_of_one_leg_and_of_the_leg_across():
     assert ends["l2_lower"] == pytest.approx([3.0 * number for number in own["l2_lower"]])
 
 
+def test_a_dragged_end_follows_the_hand_though_one_link_ends_with_the_name_of_another():
+    text = body_to_json(ROBOTS["tick"]).replace('"upper"', '"upper_arm"').replace('"lower"', '"arm"')
+    sketch = sketches.set_length_factor(sketches.open_file(Sketch(), text), "arm", 2.0, symmetric=True)
+    moved = sketches.drag_end(sketch, "l1_upper_arm", (0.01, 0.0, 0.0), symmetric=False)
+    before, after = (shaping.link_ends(sketches.make_body(each))["l1_upper_arm"] for each in (sketch, moved))
+    assert [end - start for start, end in zip(before, after, strict=True)] == pytest.approx([0.01, 0.0, 0.0], abs=1e-6)
+
+
 def test_links_change_while_other_widgets_make_no_body():
     """A page shows and changes lengths of the creature that walks on."""
     odd = Sketch(legs=5, links=2, layout="pairs")
