@@ -98,7 +98,7 @@ def _transfer_gesture(motion: Motion, body: Body, size: Size) -> tuple[Paths, li
     rest_soles, rest_height = find_rest(body)  # m
     rest_soles = rest_soles / height
     headings = _find_headings(motion)
-    partners, notes = _choose_partners(motion, body, rest_soles, turns=headings.any())
+    partners, notes = _choose_partners(motion, body, rest_soles, turns=bool(headings.any()))
     soles, planted = _plan_soles(motion, rest_soles, partners, size, headings)
     tilts = shrink_turns(rotations.turn_about_z(motion.quaternions, -headings), size.all * size.side)
     paths = Paths(
