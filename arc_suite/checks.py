@@ -15,6 +15,20 @@ from typing import Any
 
 import numpy as np
 
+# NumPy's, of which committed hashes are.
+_DEFAULT_PRINT_OPTIONS: Mapping[str, Any] = {
+    "edgeitems": 3,
+    "floatmode": "maxprec",
+    "formatter": None,
+    "infstr": "inf",
+    "legacy": False,
+    "linewidth": 75,
+    "nanstr": "nan",
+    "precision": 8,
+    "sign": "-",
+    "suppress": False,
+}
+
 MAX_SEED = 2**32 - 1  # the largest seed of a NumPy `RandomState`
 
 # Names of other libraries, and the names that this suite has for the same; errors suggest the first that is valid.
@@ -601,6 +615,12 @@ def join_choices(names: Sequence[str]) -> str:
     """Return names with commas between them, and "or" before the last one."""
     *first_names, last_name = names
     return f"{', '.join(first_names)} or {last_name}" if first_names else last_name
+
+
+def full_repr(value: Any) -> str:
+    """Return `repr` of a value with all numbers of its arrays, whatever NumPy's print options are: for hashes."""
+    with np.printoptions(**_DEFAULT_PRINT_OPTIONS, threshold=sys.maxsize):
+        return repr(value)
 
 
 def preview(value: Any) -> str:

@@ -11,7 +11,6 @@ from arc_suite.arenas import ARENAS
 from arc_suite.cpg.law import Law
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.cpg.selection import LAWS, SUITE_PRESETS, law
-from arc_suite.envs import setup_facts
 from arc_suite.envs.prepare import prepare_task
 from arc_suite.models.visuals import VISUALS
 from arc_suite.models.visuals.spec import Visuals
@@ -159,8 +158,7 @@ def register(
     for kind, additions in additions_by_kind.items():
         _TABLES[kind].update(additions)
         MODULE_OF_NAME.update({(kind, name): module for name in additions})
-    for function_of_names in (registry.distinct_name, setup_facts.describe):
-        function_of_names.cache_clear()  # a body of an earlier call may share its name with the new one
+    registry.forget_results()  # a body of an earlier call may share its name with the new one
     register_ids()
 
 

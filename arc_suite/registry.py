@@ -17,7 +17,7 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from arc_suite import checks, files, parsers
 from arc_suite.arenas import ARENAS, Arena, ground_text
@@ -128,7 +128,32 @@ def bodies_of(robot, suggestions: Iterable[str] = ()) -> tuple[Body, ...]:
     return tuple(_generate_bodies(robot, suggestions))
 
 
-@functools.lru_cache(maxsize=1024)
+_Cached = TypeVar("_Cached", bound=Callable)
+_caches: list[Any] = []  # functions whose results depend on registered names
+
+
+def cache_until_registration(maxsize: int) -> Callable[[_Cached], _Cached]:
+    """Return a decorator that keeps results of a function until `forget_results`: they depend on registered names.
+
+    Args:
+        maxsize: number of results, as of `functools.lru_cache`.
+    """
+
+    def decorate(function: _Cached) -> _Cached:
+        cached_function = functools.lru_cache(maxsize=maxsize)(function)
+        _caches.append(cached_function)
+        return cast(_Cached, cached_function)
+
+    return decorate
+
+
+def forget_results() -> None:
+    """Forget the results that functions of `cache_until_registration` keep, as a new name may change them."""
+    for cached_function in _caches:
+        cached_function.cache_clear()
+
+
+@cache_until_registration(maxsize=1024)
 def distinct_name(body: Body) -> str:
     """Return the name of a body for ids, tables and files, with a hash if the suite has another body of that name."""
     named_body = _find_body(body.name)

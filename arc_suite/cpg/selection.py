@@ -207,10 +207,10 @@ def obedient_presets(task: Task) -> tuple[str, ...]:
     """
     presets = presets_of(task.scene.body)
     default = suited_preset(task)
-    name_of_parameters = {repr(presets[default]): default}
+    name_of_parameters = {checks.full_repr(presets[default]): default}
     for name, preset in presets.items():
         if _is_able(task, preset) and not ignored_commands(task, law(task, preset)):
-            name_of_parameters.setdefault(repr(preset), name)
+            name_of_parameters.setdefault(checks.full_repr(preset), name)
     return tuple(name_of_parameters.values())
 
 

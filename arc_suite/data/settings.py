@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from arc_suite import policies, registry, seed_ranges
+from arc_suite import checks, policies, registry, seed_ranges
 from arc_suite.cpg.selection import presets_of, suited_preset
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
@@ -78,7 +78,9 @@ class DatasetSettings(NamedTuple):
         presets = presets_of(self.setup.body) if names else {}
         record = self.setup.provenance() | self._asdict() | {"presets": list(names)}
         del record["setup"]
-        record["presets_sha256"] = [_sha256(repr(presets.get(registry.bare_name(preset)))) for preset in names]
+        record["presets_sha256"] = [
+            _sha256(checks.full_repr(presets.get(registry.bare_name(preset)))) for preset in names
+        ]
         policy_sha256 = provenance.policy_sha256(self.policy)
         if policy_sha256 is not None:
             record["policy_sha256"] = policy_sha256

@@ -4,7 +4,6 @@ Snapshots contain them, since arrays of another setup may have the same shapes.
 """
 
 import dataclasses
-import functools
 import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,7 +21,7 @@ _DIGITS = 9  # significant digits of numbers, as machines may differ in the last
 _CACHED_TASKS = 16
 
 
-@functools.lru_cache(maxsize=_CACHED_TASKS)
+@registry.cache_until_registration(maxsize=_CACHED_TASKS)
 def describe(task: Task) -> str:
     """Return the facts of a task's setup as JSON of texts by name.
 

@@ -18,7 +18,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
-from arc_suite import parsers, policies
+from arc_suite import parsers, policies, registry
 from arc_suite.cpg.selection import ignored_commands, law, preset_of, suited_preset, suited_presets
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import judging, protocol
@@ -157,7 +157,7 @@ def are_of_before(seeds: Sequence[int]) -> bool:
     return len(seeds) > 0 and max(seeds) < protocol.EPISODES
 
 
-@functools.lru_cache(maxsize=16)
+@registry.cache_until_registration(maxsize=16)
 def _measure_several_bodies(setup: Setup) -> Anchors:
     """Return the anchors of several bodies, each in one episode with the demonstrator that suits it."""
     zero = []
@@ -178,7 +178,7 @@ def committed_returns(setup: Setup) -> Returns | None:
     return _table().get(str(setup))
 
 
-@functools.lru_cache(maxsize=16)
+@registry.cache_until_registration(maxsize=16)
 def measure_returns(setup: Setup, episodes: int = protocol.CURVE_EPISODES, first_seed: int = 0) -> Returns:
     """Return the returns of standing still and of demonstrators that suit the task, from a seed on; see `anchors`.
 

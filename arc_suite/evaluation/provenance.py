@@ -4,7 +4,7 @@ import hashlib
 import os
 from typing import Any
 
-from arc_suite import policies, seed_ranges
+from arc_suite import checks, policies, seed_ranges
 from arc_suite.envs.setup import Setup
 from arc_suite.simulation.model_hash import PHYSICS
 
@@ -19,7 +19,7 @@ def of_setup(setup: Setup) -> dict[str, Any]:
     """
     task = setup.definition
     values = setup.provenance()
-    values["task_sha256"] = hashlib.sha256(repr(task.settings).encode()).hexdigest()
+    values["task_sha256"] = hashlib.sha256(checks.full_repr(task.settings).encode()).hexdigest()
     record = {name: values[name] for name in _FIELDS}
     if task.start_table is not None:
         record["start_sha256"] = hashlib.sha256(task.start_table.tobytes()).hexdigest()

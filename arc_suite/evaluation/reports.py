@@ -163,7 +163,8 @@ def evaluate(
         policy: a name or a path, see `policies.policy`; a policy for one environment, such as
             `arc_suite.learning.train` returns; or a function of a `TimeStep` with named blocks.
         robot: a body; None for that of a trained policy.
-        task: its name; None for that of a trained policy with its settings, which `task_kwargs` change, or walk.
+        task: its name; None for that of a trained policy, the first of several, with its settings, which
+            `task_kwargs` change, or walk.
         task_kwargs: see `arc_suite.load`.
         preset: preset of the demonstrator; None for the one that suits task and body.
         episodes: number of episodes.
@@ -179,13 +180,15 @@ def evaluate(
     if setup_of_policy is not None:
         setup_of_policy = setup_of_policy.judging()
     if robot is None:
-        policies.refuse_other_words(policy, policies.POLICIES)
-        if setup_of_policy is None or setup_of_policy.several:
+        if setup_of_policy is None:
+            policies.refuse_other_words(policy, policies.POLICIES)
             raise ValueError("robot: expected a body, as the policy brings none")
+        if setup_of_policy.several:
+            raise ValueError(f"robot: expected a body, as the policy learned on several: {setup_of_policy}")
         robot = setup_of_policy.body
     settings = dict(task_kwargs or {})
     if task is None and setup_of_policy is not None:
-        task = setup_of_policy.task
+        task = setup_of_policy.tasks[0]
         settings = setup_of_policy.task_kwargs | settings
     setup = Setup.of(robot, task or "walk", settings)
     provenance.training_seeds(policy, seeds)

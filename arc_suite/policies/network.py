@@ -134,8 +134,8 @@ def save(path: str | os.PathLike[str], network: Network) -> None:
     record["training_seeds"] = seed_ranges.to_json(network.training_seeds)
     if not network.setup.several:
         record[PHYSICS] = network.setup.physics_sha256
-    with files.writing(path) as temporary:
-        np.savez(temporary, policy=np.array(json.dumps(record)), **network.graph.arrays)  # type: ignore[arg-type]
+    with files.writing(path) as temporary, open(temporary, "wb") as file:  # by its path, savez adds an extension
+        np.savez(file, policy=np.array(json.dumps(record)), **network.graph.arrays)  # type: ignore[arg-type]
 
 
 def digest(network: Network) -> str:

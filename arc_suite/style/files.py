@@ -120,11 +120,12 @@ def _track(setup: Setup, arrays: Mapping[str, np.ndarray]) -> Track:
     """Return the track of arrays by their paths in it; arrays without axes become numbers."""
     fields: dict[str, Any] = {}
     for name, array in arrays.items():
-        *keys, last_key = name.split("/")
-        mapping = fields
-        for key in keys:
-            mapping = mapping.setdefault(key, {})
-        mapping[last_key] = array if array.ndim > 0 else array.item()
+        field, slash, key = name.partition("/")
+        value = array if array.ndim > 0 else array.item()
+        if slash:
+            fields.setdefault(field, {})[key] = value
+        else:
+            fields[field] = value
     _check(fields, setup.body)
     if "parameters" in fields:
         fields["parameters"] = Parameters(**fields["parameters"])

@@ -16,6 +16,8 @@ from arc_suite.arenas import ARENAS, FLAT
 from arc_suite.cpg.law import Clocked
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.cpg.selection import LAWS
+from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import anchors
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 from arc_suite.tasks.parameters import PARAMETERS
@@ -415,6 +417,21 @@ def test_a_body_has_another_name_once_a_robot_has_its_own():
     assert registry.distinct_name(body) == "zork"
     arc_suite.register(body=TICK.replace(name="zork"))
     assert re.fullmatch(r"zork_[0-9a-f]{6}", registry.distinct_name(body))
+
+
+@pytest.mark.usefixtures("_restored_tables")
+def test_anchors_are_measured_anew_once_something_is_registered(monkeypatch):
+    """Demonstrators of a law that is registered later may suit the task."""
+    policies_of_calls = []
+    monkeypatch.setattr(anchors, "play_returns", lambda setup, policy, seeds: policies_of_calls.append(policy))
+    setup = Setup.of(TICK.replace(name="zork"), "walk", {"time_limit": 0.1})
+    anchors.measure_returns(setup)
+    count = len(policies_of_calls)
+    anchors.measure_returns(setup)
+    assert len(policies_of_calls) == count > 0
+    arc_suite.register(families={"zorks": lambda seed: TICK})
+    anchors.measure_returns(setup)
+    assert len(policies_of_calls) == 2 * count
 
 
 @pytest.mark.filterwarnings("ignore:.*out of date")

@@ -7,10 +7,11 @@ import pytest
 from returns import RETURNS
 
 import arc_suite
-from arc_suite import evaluation, policies
+from arc_suite import checks, data, evaluation, policies
 from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import provenance
 
 
 def test_episodes_are_seeded_and_sum_up_what_the_environment_says():
@@ -28,6 +29,17 @@ def test_episodes_are_seeded_and_sum_up_what_the_environment_says():
     assert third.progress.keys() == {"speed", "gait_compliance", "cost_of_transport"}
     assert third.progress["gait_compliance"] == pytest.approx(compliance / 40)
     assert third.progress["speed"] == pytest.approx((environment.physics.data.xpos[1, 0] - start) / 2.0)
+
+
+def test_hashes_do_not_depend_on_print_options():
+    """Those of a task and of a dataset's presets; all numbers of long arrays count."""
+    setup = Setup.of("tick", "steer")
+    record = data.DatasetSettings(setup, policy="cpg").provenance()
+    with np.printoptions(precision=2, suppress=True, sign="+", threshold=2, legacy="1.13"):
+        assert provenance.of_setup(setup) == provenance.of_setup(Setup.of("tick", "steer"))
+        assert data.DatasetSettings(setup, policy="cpg").provenance() == record
+        changed = checks.full_repr(np.arange(5000.0))
+    assert changed == checks.full_repr(np.arange(5000.0)) and "2.500e+03" in changed
 
 
 def test_policies_get_named_environments_and_the_reward_of_the_step_before():

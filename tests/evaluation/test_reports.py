@@ -5,6 +5,7 @@ import json
 import numpy as np
 import programs
 import pytest
+from networks import of_many_bodies
 from refusals import refused
 
 from arc_suite.bodies import generator
@@ -37,6 +38,17 @@ def test_policies_of_any_kind():
     report = evaluate(trained, task_kwargs=SHORT, episodes=1)  # which brings its robot and task
     assert report.setup.body.name == "tick" and report.setup.task_kwargs == SHORT
     assert report.episodes == evaluate(network.PACKAGED / "tick-walk.npz", task_kwargs=SHORT, episodes=1).episodes
+
+
+def test_policies_of_several_bodies_and_tasks_by_their_folder(tmp_path, monkeypatch):
+    """They play in the first of their tasks, on a body that the caller names."""
+    (tmp_path / "several").mkdir()
+    network.save(tmp_path / "several" / network.FILE, of_many_bodies(task="steer,walk"))
+    monkeypatch.chdir(tmp_path)
+    report = evaluate("several", "tick", task_kwargs=SHORT, episodes=1)
+    assert report.setup.task == "steer" and report.setup.task_kwargs == SHORT
+    with refused("robot: expected a body, as the policy learned on several: random:0-1, steer+walk"):
+        evaluate("several")
 
 
 def test_what_does_not_fit_is_one_line():

@@ -175,9 +175,11 @@ def test_an_environment_does_the_same_alone(num_envs):
 
 
 @pytest.mark.parametrize("make", [made, of_many_bodies], ids=["one body", "many bodies"])
-def test_comes_back_from_a_file_to_the_bit(tmp_path, make):
-    network.save(tmp_path / "policy.npz", policy := make())
-    again = network.load(tmp_path / "policy.npz")
+@pytest.mark.parametrize("name", ["policy.npz", "policy", "walk.policy", "WALK.NPZ"])
+def test_comes_back_from_a_file_to_the_bit(tmp_path, make, name):
+    network.save(tmp_path / name, policy := make())
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    again = network.load(tmp_path / name)
     hash_of_one = None if policy.setup.several else policy.setup.physics_sha256
     assert again[1:] == policy._replace(physics_sha256=hash_of_one)[1:]
     assert again.graph.nodes == policy.graph.nodes and again.graph.arrays.keys() == policy.graph.arrays.keys()

@@ -39,6 +39,14 @@ def saved(leaper, tmp_path_factory):
     return path
 
 
+def test_names_of_metrics_may_have_slashes(leaper, tmp_path):
+    """As tasks of other packages give them: `distance/ahead` beside `distance`."""
+    tracks = [track._replace(progress=track.progress | {"distance/ahead": 1.5, "a/b/c": 2.0}) for track in leaper]
+    save(tmp_path / "tracks.npz", tracks)
+    for track, loaded in zip(tracks, load(tmp_path / "tracks.npz"), strict=True):
+        assert_same(track, loaded)
+
+
 @pytest.mark.parametrize("task", ["walk", "steer", "directed"])
 @pytest.mark.parametrize("body", ["queen", BODY], ids=["queen", "made"])
 def test_tracks_survive_the_way_there_and_back(body, task, tmp_path):

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 import numpy as np
 from dm_control import mjcf
 
+from arc_suite import checks
 from arc_suite.models.outline import solid_corners
 from arc_suite.models.visuals import bastion, leaper, queen, tick
 from arc_suite.models.visuals.generic import generic_visuals
@@ -98,7 +99,7 @@ def _visuals(body: Body) -> Visuals:
 
 def key_of(body: Body) -> str:
     """Return a text for keys of caches, which changes with the visuals that are registered under a body's name."""
-    return repr(VISUALS.get(body.name))
+    return checks.full_repr(VISUALS.get(body.name))
 
 
 def add_materials(root: mjcf.RootElement, body: Body) -> None:
