@@ -332,6 +332,7 @@ def _record(
         run_seeds: seeds of the runs that this process trains.
     """
     folder = Path(folder)
+    _check_start(configuration)
     record = configuration.record()
     if configuration.prior is not None:  # the data under an id may change
         record[PRIOR_SHA256] = priors.dataset_digest(configuration.prior)
@@ -431,6 +432,12 @@ def _postfix(metrics: Mapping[str, float], progress_values: Mapping[str, Any]) -
         values["return"] = progress_values["return"]
     values |= dict(list(metrics.items())[:2])
     return ", ".join(f"{name} {value:.4g}{_UNITS.get(name, '')}" for name, value in values.items())
+
+
+def _check_start(configuration: Configuration) -> None:
+    """Raise ValueError for an algorithm that learns from a policy, without the policy to start from."""
+    if configuration.definition.source == usage.POLICY and getattr(configuration.hyperparameters, "start", None) == "":
+        raise ValueError("start: expected the folder of a run whose policy is where learning starts, got none")
 
 
 def _training_seeds(configuration: Configuration, folder: Path) -> seed_ranges.Ranges | None:

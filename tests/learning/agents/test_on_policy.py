@@ -327,6 +327,14 @@ def test_a_start_that_does_not_fit_is_refused_in_one_line(begun, tmp_path, imita
         begun(changes={"start": str(tmp_path / "none")}, algorithm="finetune").advance()
 
 
+def test_a_learner_from_a_policy_needs_one(tmp_path):
+    """Also without a warm-up of values: it would learn from nothing."""
+    run = Configuration.of(Setup.of("leaper"), "finetune", CHANGES | {"value_warm_up": 0}, steps=32)
+    with refused("start: expected the folder of a run whose policy is where learning starts, got none"):
+        train(run, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
 def test_a_start_of_a_learner_from_nothing_is_refused_with_the_learner_that_takes_it(begun):
     for robot, name in (("leaper", "finetune"), ("leaper,tick", "finetune_bodies")):
         message = f"start: expected none, as ppo learns from no policy; --algorithm {name} does, got 'runs/x'"
