@@ -429,7 +429,7 @@ def test_anchors_are_measured_anew_once_something_is_registered(monkeypatch):
     count = len(policies_of_calls)
     anchors.measure_returns(setup)
     assert len(policies_of_calls) == count > 0
-    arc_suite.register(families={"zorks": lambda seed: TICK})
+    arc_suite.register(body=OTHER)
     anchors.measure_returns(setup)
     assert len(policies_of_calls) == 2 * count
 
