@@ -12,6 +12,7 @@ import os
 import platform
 import re
 import time
+import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import IO, Any
@@ -189,13 +190,20 @@ def _to_json_values(value):
 def delete_temporaries(path: str | os.PathLike[str]) -> None:
     """Delete all temporary files of `writing` for a target; the caller knows that no process is writing it."""
     target = Path(path)
-    for temporary in target.parent.glob(f".{target.stem[:_MAX_STEM]}.*{target.suffix}"):
+    for temporary in target.parent.glob(f".{glob.escape(_temporary_stem(target))}.*{glob.escape(target.suffix)}"):
         temporary.unlink()
 
 
 def _temporary_prefix(target: Path) -> str:
     """Return the beginning of the names of this machine's temporary files; other machines may share the folder."""
-    return f".{target.stem[:_MAX_STEM]}.{platform.node()}."
+    return f".{_temporary_stem(target)}.{platform.node()}."
+
+
+def _temporary_stem(target: Path) -> str:
+    """Return a target's name in the names of its temporary files; a long one is shorter, with a checksum."""
+    if len(target.stem) <= _MAX_STEM:
+        return target.stem
+    return f"{target.stem[:_MAX_STEM]}-{zlib.crc32(target.name.encode()):08x}"
 
 
 def _delete_old_temporaries(target: Path) -> None:

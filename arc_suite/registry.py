@@ -248,20 +248,38 @@ def join_bodies(parts: Sequence[str]) -> str:
 
 
 def embed_bodies(robot: str) -> str:
-    """Return a text that names several bodies, with the JSON of bodies in place of their files.
+    """Return a text that names several bodies for other processes.
+
+    It has the JSON of bodies in place of their files, and `module:name` for names of other packages.
 
     Raises:
         ValueError: a file that contains no body.
         OSError: a file that cannot be read.
     """
-    return join_bodies(
-        [body_to_json(_read_file(Path(part))) if _is_path(part) else part for part in split_bodies(robot)]
-    )
+    return join_bodies([_embed_body(part) for part in split_bodies(robot)])
+
+
+def _embed_body(part: str) -> str:
+    """Return a part of a text that names several bodies; see `embed_bodies`."""
+    if _is_path(part):
+        return body_to_json(_read_file(Path(part)))
+    if _is_json(part):
+        return part
+    family = family_in(part)
+    return _add_module("family", family) + part.removeprefix(family) if family else _add_module("robot", part)
 
 
 def label_bodies(robot: str) -> str:
-    """Return a text that names several bodies for people: with the name of a body in place of its JSON."""
-    return ",".join(distinct_name(body_from_json(part)) if _is_json(part) else part for part in split_bodies(robot))
+    """Return a text that names several bodies for people: with names in place of JSON, and without modules."""
+    return ",".join(map(_label_body, split_bodies(robot)))
+
+
+def _label_body(part: str) -> str:
+    """Return a part of a text that names several bodies; see `label_bodies`."""
+    if _is_json(part):
+        return distinct_name(body_from_json(part))
+    family = family_in(part)
+    return bare_name(family) + part.removeprefix(family) if family else bare_name(part)
 
 
 def family_in(part: str) -> str:
@@ -481,7 +499,9 @@ def arena_maker(arena: str | os.PathLike[str]) -> Callable[[Body], Arena]:
 
 
 def arena_word(arena: str | os.PathLike[str]) -> str:
-    """Return the word for an arena that files may contain: ground as text in place of its file.
+    """Return the word for an arena that files may contain.
+
+    It is ground as text in place of its file, and `module:name` for a name of another package.
 
     Raises:
         ValueError: as `arena_maker`.
@@ -490,7 +510,7 @@ def arena_word(arena: str | os.PathLike[str]) -> str:
     word = os.fspath(arena) if isinstance(arena, os.PathLike) else arena
     ground_file = _ground_file(word)
     if ground_file is None:
-        return word
+        return _add_module("arena", word) if isinstance(word, str) else word
     path, scale = ground_file
     reader = GROUND_READERS.get(path.suffix.lower())
     if reader is None:
@@ -647,6 +667,12 @@ def importable_name(kind: str, name: str) -> str:
     """Return a name in the form that other processes can look up: `module:name` where another package registers it."""
     module = MODULE_OF_NAME.get((kind, name))
     return name if module is None else f"{module}:{name}"
+
+
+def _add_module(kind: str, name: str) -> str:
+    """Return `module:name` for a name that another package has registered, and other names as they are."""
+    registered_name = bare_name(name)
+    return importable_name(kind, registered_name) if (kind, registered_name) in MODULE_OF_NAME else name
 
 
 def env_id(domain_name: str, task: type[Task]) -> str:

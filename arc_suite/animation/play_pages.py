@@ -194,7 +194,8 @@ def _grounds(arena: str | None) -> dict[str, str]:
         return GROUNDS
     word = registry.arena_word(arena)
     names_of_grounds = {ground: name for name, ground in GROUNDS.items()}
-    name = names_of_grounds.get(word) or (ground_text.name_of(word) if ground_text.is_text(word) else word)
+    own_name = ground_text.name_of(word) if ground_text.is_text(word) else registry.bare_name(word)
+    name = names_of_grounds.get(word) or own_name
     if GROUNDS.get(name, word) != word:
         name = f"own {name}"  # a file may have the name of a ground that each page has
     return {name: word, **GROUNDS}

@@ -401,7 +401,7 @@ def _find_source(name: str | os.PathLike[str]) -> PolicyFile | NetworkPath | Fun
         return network_path
     if ":" in text:
         return FunctionName(text)
-    if os.sep in text or files.is_folder(text):
+    if os.sep in text or files.is_folder(text) or os.path.isfile(text):
         return network_path
     return None
 

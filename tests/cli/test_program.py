@@ -240,6 +240,16 @@ def test_writing_replaces_the_target_of_a_link_too_and_only_at_the_end(tmp_path)
     assert link.is_symlink() and target.read_text() == "newer"
 
 
+def test_files_whose_names_begin_alike_are_written_side_by_side(tmp_path):
+    """Long names are shorter in the names of temporary files."""
+    targets = [tmp_path / f"{'walk_' * 10}{name}.npz" for name in ("left", "right")]
+    with writing(targets[0]) as one, writing(targets[1]) as other:
+        one.write_text("left")
+        other.write_text("right")
+    assert [target.read_text() for target in targets] == ["left", "right"]
+    assert len(list(tmp_path.iterdir())) == 2
+
+
 @pytest.mark.parametrize(
     ("path", "reason"),
     [

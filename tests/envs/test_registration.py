@@ -2,6 +2,8 @@
 
 import functools
 import re
+import sys
+import types
 from typing import ClassVar, NamedTuple
 
 import gymnasium
@@ -417,6 +419,24 @@ def test_a_body_has_another_name_once_a_robot_has_its_own():
     assert registry.distinct_name(body) == "zork"
     arc_suite.register(body=TICK.replace(name="zork"))
     assert re.fullmatch(r"zork_[0-9a-f]{6}", registry.distinct_name(body))
+
+
+@pytest.mark.usefixtures("_restored_tables")
+def test_setups_name_parts_as_other_processes_can_import_them(monkeypatch):
+    """As `module:name` in files and for other processes, and by the name alone for people."""
+    monkeypatch.setitem(registry.FAMILIES, "zorks", lambda seed: TICK)
+    monkeypatch.setitem(registry.MODULE_OF_NAME, ("family", "zorks"), "zork_package")
+    monkeypatch.setitem(ARENAS, "field", lambda body: FLAT)
+    monkeypatch.setitem(registry.MODULE_OF_NAME, ("arena", "field"), "zork_package")
+    monkeypatch.setitem(ROBOTS, "other", OTHER)
+    monkeypatch.setitem(registry.MODULE_OF_NAME, ("robot", "other"), "zork_package")
+    monkeypatch.setitem(sys.modules, "zork_package", types.ModuleType("zork_package"))
+    setup = Setup.of("zorks:0-1,other,tick", "walk", {"arena": "field"})
+    assert setup.robot == "zork_package:zorks:0-1,zork_package:other,tick"
+    assert setup.task_kwargs == {"arena": "zork_package:field"}
+    assert setup.name == "zorks.0-1+other+tick"
+    qualified_setup = Setup.of(setup.robot, "walk", {"arena": "zork_package:field"})
+    assert setup == qualified_setup == Setup.from_dict(setup.to_dict())
 
 
 @pytest.mark.usefixtures("_restored_tables")

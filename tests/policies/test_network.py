@@ -198,6 +198,12 @@ def test_is_a_policy_of_every_program(saved, name, monkeypatch):
     assert policies.policy(saved.name, "tick").setup.robot == "tick"
 
 
+def test_a_file_in_the_current_folder_may_have_no_extension(saved, monkeypatch):
+    (saved / "policy.npz").rename(saved / "stroller")
+    monkeypatch.chdir(saved)
+    assert policies.policy("stroller", "tick").setup == policies.setup_of("stroller") == made().setup
+
+
 def test_a_file_may_have_its_extension_in_capitals(saved, monkeypatch):
     (saved / "policy.npz").rename(saved / "WALK.NPZ")
     monkeypatch.chdir(saved)

@@ -180,9 +180,10 @@ def read(studies: Path) -> dict[tuple[str, str], list[RunScore]]:
     """
     scores_by_learner: dict[tuple[str, str], list[RunScore]] = {}
     for row in csv_files.read(studies / SCORES, COLUMNS):
-        division = checks.name(row.pop("division"), DIVISIONS, "division")
-        learner = row.pop("learner")
-        cells = {name: kind(row[name]) for name, kind in RunScore.__annotations__.items()}
+        with parsers.guard(f"{studies / SCORES}"):
+            division = checks.name(row.pop("division"), DIVISIONS, "division")
+            learner = row.pop("learner")
+            cells = {name: kind(row[name]) for name, kind in RunScore.__annotations__.items()}
         score = RunScore(**cells)
         if np.isinf((score.result, score.score)).any():
             what = f"got {score.result} and {score.score}"

@@ -293,6 +293,11 @@ def test_damaged_scores_are_one_line(tmp_path):
     (tmp_path / benchmark.SCORES).write_text("robot,task\n")
     with pytest.raises(ValueError, match=r"scores.csv: expected lines of division, learner, robot, task, "):
         benchmark.text(tmp_path)
+    cells = dict.fromkeys(benchmark.COLUMNS, "1") | {"division": "top", "result": "abc"}
+    for changes, line in (({}, "could not convert"), ({"division": "tpo"}, "unknown division 'tpo'; did you mean")):
+        (tmp_path / benchmark.SCORES).write_text(f"{','.join(cells)}\n{','.join((cells | changes).values())}\n")
+        with pytest.raises(ValueError, match=rf"scores.csv: {line}"):
+            benchmark.text(tmp_path)
 
 
 def run(*arguments, cwd):
