@@ -233,20 +233,20 @@ class Setup:
         return Setup._make(self.domain, self.task, settings | dict(changes))
 
     def learning(self) -> "Setup":
-        """Return the setup to learn in: with the settings of `training_settings`, unless they are set.
-
-        Policies are judged in the setup itself.
-        """
-        return self.with_settings({**self.training_settings, **self.task_kwargs})
+        """Return the setup to learn in: with `training_settings`. Policies are judged in the setup itself."""
+        return self.with_settings(self.training_settings)
 
     @property
     def training_settings(self) -> dict[str, Any]:
-        """Settings that the task has for training alone; several tasks have those in which all of them agree."""
+        """Settings that the task has for training alone, except those that the setup itself gives.
+
+        Several tasks have those in which all of them agree.
+        """
         tasks = registry.tasks_of(self.task)
         return {
             name: value
             for name, value in self.kind.training.items()
-            if all(task.training.get(name) == value for task in tasks)
+            if name not in self.task_kwargs and all(task.training.get(name) == value for task in tasks)
         }
 
     def validation(self, count: int) -> "Setup":

@@ -68,6 +68,17 @@ def test_learners_have_falls_of_their_own():
     assert chosen.training_setup.task_kwargs["fall_seed"] == 7
 
 
+def test_a_setting_of_the_user_holds_in_training_too():
+    pytest.importorskip("jax")
+    from arc_suite.learning.agents.configuration import Configuration
+
+    short = Setup.of("tick", "recover", {"time_limit": 5.0})
+    learned = Configuration.of(short).training_setup.task_kwargs
+    assert (learned["fall_seed"], learned["time_limit"]) == (1, 5.0)
+    longer = Configuration.of(short, training={"time_limit": 10.0})
+    assert longer.training_setup.task_kwargs["time_limit"] == 10.0
+
+
 def test_others_learn_from_falls_of_training_unless_they_choose():
     judged = Setup.of("tick", "recover", {"weights": {"up": 2.0}})
     assert judged.learning() == judged.with_settings({"fall_seed": 1, "time_limit": 10.0})
