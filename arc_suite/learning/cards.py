@@ -149,7 +149,8 @@ def _describe(run: Configuration, folder: Path, returns: np.ndarray, episodes_te
     yield "task", run.setup.kind.name
     yield "settings", f"`{_shorten(settings)}`"
     if run.training:
-        yield "settings in training alone", f"`{_shorten(json.dumps(dict(run.training)))}`"
+        training = run.setup.with_settings(run.training, dropped=run.setup.task_kwargs)
+        yield "settings in training alone", f"`{_shorten(json.dumps(training.labeled_settings))}`"
     yield "algorithm, seed", f"{run.algorithm}, {run.seed}"
     yield "steps", f"{int(run_folder.read_progress(folder)['evaluated']):,} of {run.steps:,}"
     yield "return", f"{mean:.1f}, 95 % interval {_interval_text(interval, '.1f')}, {returns.size} {episodes_text}"

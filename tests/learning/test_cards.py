@@ -84,6 +84,7 @@ def test_commands_hold_no_text_of_a_file(tmp_path):
         Configuration.of(arc_suite.Setup.of("tick", "steer"), "ppo", {"style": str(walk)}),
         Configuration.of(arc_suite.Setup.of("tick", "mimic", {"motion": str(walk)}), "ppo"),
         Configuration.of(arc_suite.Setup.of("tick", "steer", ground), "ppo"),
+        Configuration.of(arc_suite.Setup.of("tick", "steer"), "ppo", training=ground),
         Configuration.of(arc_suite.Setup.of(TICK.replace(name="dachs")), "ppo"),
     )
     assert [cards._training_command(run) for run in of_files] == [AGAIN] * len(of_files)
@@ -96,9 +97,13 @@ def test_a_card_names_the_motion_of_a_file(tmp_path):
     motions.save(striding.stride(TICK, 1.5, 0.6, np.array((0.0, 0.5, 0.0, 0.5, 0.0, 0.5)), 0.3), walk)
     settings = {"motion": str(walk), "time_limit": 0.25}
     folder = tmp_path / "run"
-    learning.train("tick", "mimic", "tiny_studies:climb", task_kwargs=settings, steps=20, folder=folder)
+    training = {"motion": str(walk)}
+    learning.train(
+        "tick", "mimic", "tiny_studies:climb", task_kwargs=settings, training=training, steps=20, folder=folder
+    )
     card = cards.text(configuration.read(folder / "config.json"), folder)
     assert '| settings | `{"motion": "walk", "time_limit": 0.25}` |' in card and AGAIN in card
+    assert '| settings in training alone | `{"motion": "walk"}` |' in card
     assert max(map(len, card.splitlines())) < 1000
 
 

@@ -118,6 +118,8 @@ class Configuration:
             raise ValueError(f"prior: expected the id of a dataset, got {checks.preview(prior)}")
         training = {**setup.training_settings, **checks.mapping("training", training)}
         _check_training(setup, definition, training)
+        # As in a setup, ground and motions of files become texts, and names of other packages have their modules.
+        embedded_training = setup.with_settings(training, dropped=setup.task_kwargs)
         return cls(
             setup=setup,
             algorithm=registry.importable_name("algorithm", registry.bare_name(algorithm)),
@@ -126,7 +128,7 @@ class Configuration:
             steps=steps,
             evaluate_every=evaluate_every,
             prior=prior,
-            training_json=checks.json_text("training", dict(training)),
+            training_json=embedded_training.settings_json,
         )
 
     @property
@@ -433,7 +435,8 @@ def _check_start(setup: Setup, name: str, definition: algorithms.Algorithm) -> N
 
 
 def _check_training(setup: Setup, definition: algorithms.Algorithm, training: Mapping[str, Any]) -> None:
-    """Raise ValueError for settings of training that have no effect, and for a curriculum in evaluations."""
+    """Raise ValueError for settings of training that do not fit or have no effect, and a curriculum in evaluations."""
+    checks.json_text("training", dict(training))
     curriculum = setup.task_kwargs.get(CURRICULUM)
     if curriculum:
         raise ValueError(

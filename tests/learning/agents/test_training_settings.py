@@ -2,14 +2,17 @@
 
 import json
 
+import imageio.v3 as imageio
 import numpy as np
 import pytest
 from conftest import learning
 from numpy.testing import assert_allclose, assert_array_equal
 
+from arc_suite import motions
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents.algorithms import ALGORITHMS
 from arc_suite.learning.agents.configuration import Configuration
+from arc_suite.motions import striding
 from arc_suite.policies import network
 from arc_suite.tasks.modifiers import Kicks
 
@@ -27,6 +30,22 @@ def test_a_configuration_holds_both():
     assert json.loads(json.dumps(run.to_dict()))["training"] == KICKS
     assert Configuration.from_dict(json.loads(json.dumps(run.to_dict()))) == run
     assert run.command.endswith(" --set=time_limit=1.0 '--train_set=friction=[0.5, 1.0]' --train_set=kicks=1.5")
+
+
+def test_ground_and_motion_of_training_are_texts(tmp_path):
+    """Runs go on and cards are written without the files that settings of training name."""
+    level = tmp_path / "level.png"
+    imageio.imwrite(level, np.tile(np.uint8([0, 200]), (8, 4)))
+    run = Configuration.of(STEER, "ppo", training={"arena": f"{level}:20x20x0.1"})
+    walk = tmp_path / "walk.npz"
+    motions.save(striding.stride(Setup.of("tick").body, 1.5, 0.6, np.arange(6) % 2 / 2, 0.3), walk)
+    mimic = Configuration.of(Setup.of("tick", "mimic", {"motion": "walk"}), "ppo", training={"motion": str(walk)})
+    expected_setup = mimic.policy_setup.with_settings({"motion": str(walk)})
+    for path in (level, walk):
+        path.unlink()
+    assert run.training_setup.labeled_settings["arena"] == "level"
+    assert Configuration.from_dict(json.loads(json.dumps(run.to_dict()))) == run
+    assert mimic.training_setup == expected_setup
 
 
 def test_a_configuration_holds_plain_numbers_of_numpy_ones():
