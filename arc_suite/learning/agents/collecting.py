@@ -67,7 +67,8 @@ class EnvironmentRollouts:
 
         Returns:
             Arrays (horizon, num_envs, ...) by the names of `ROLLOUT_ARRAYS`. A step that begins another command counts
-            as `ended`, and the observation before it as the next one; see `VectorEnv.resampled`. With a style also
+            as `ended`, and the observation before it as the next one; see `VectorEnv.resampled`. The latter holds for
+            a step that diverges, too, after which the body is in the model's default state. With a style also
             `poses`, the poses before and after each step.
 
         Raises:
@@ -85,8 +86,9 @@ class EnvironmentRollouts:
             view = self._view(observation, info)
             has_ended = terminated | truncated
             has_new_command = self.environment.resampled()
+            keeps_view = has_new_command | info.get("diverged", False)
             next_view = view.copy()
-            next_view[has_new_command] = self.observation[has_new_command]
+            next_view[keeps_view] = self.observation[keeps_view]
             poses = self._read_poses(observation)
             if self.style is not None:
                 rollout["poses"].append(pair_poses(self._poses, poses))

@@ -173,12 +173,14 @@ def _step(
     for run, run_actions in zip(runs, actions, strict=True):
         run.check_actions(run_actions)
     step = environments.step(np.stack(actions))
+    # A divergence is a fault of the simulator, and no way into the model's default state.
+    keeps_observation = step.diverged[..., None]
     transitions = Transitions(
         observations=observations,
         actions=np.stack(actions),
         rewards=step.rewards,
         goes_on=~step.terminated,
-        next_observations=step.final_observations,
+        next_observations=np.where(keeps_observation, observations, step.final_observations),
     )
     updates.add(transitions, step.ended)
     for index, run in enumerate(runs):

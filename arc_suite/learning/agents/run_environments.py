@@ -19,6 +19,7 @@ class EnvironmentStep(NamedTuple):
         rewards: (...)
         terminated: (...) whether the return after the step is 0.
         ended: (...) whether the episode has ended.
+        diverged: (...) whether the physics has diverged in the step: `final_observations` is of the default state.
     """
 
     observations: np.ndarray
@@ -26,6 +27,7 @@ class EnvironmentStep(NamedTuple):
     rewards: np.ndarray
     terminated: np.ndarray
     ended: np.ndarray
+    diverged: np.ndarray
 
 
 class RunEnvironments:
@@ -83,7 +85,8 @@ class RunEnvironments:
             final_observations = observations.copy()
             for row in np.flatnonzero(ended):
                 final_observations[row] = info["final_obs"][row]
-            group_step = (observations, final_observations, rewards, terminated, ended)
+            diverged = info.get("final_info", {}).get("diverged", np.zeros_like(ended))
+            group_step = (observations, final_observations, rewards, terminated, ended, diverged)
             for index, *arrays in zip(indices, *map(self._split, group_step), strict=True):
                 steps[index] = arrays
         return EnvironmentStep(*(np.stack(arrays) for arrays in zip(*steps, strict=True)))

@@ -60,6 +60,8 @@ class Learning:
             return getattr(variables["updates"], f"_{name}")
         if name == "task":
             return variables["environments"].tasks[0]
+        if name == "environment":
+            return variables["environments"]._groups[0][1]
         return getattr(variables["runs"][0], name)
 
 

@@ -56,6 +56,19 @@ def test_actions_are_uniform_while_the_buffer_is_small(learner, acted):
     assert np.abs(actions).max() > 0.9 and abs(actions.mean()) < 0.1
 
 
+def test_a_step_that_diverges_has_the_observation_before_as_the_next_one(learner):
+    """The body does not come from anywhere into the model's default state."""
+    agent = learner("sac", small("sac"))
+    agent.until(5)
+    agent.environment.batch.data.qvel[0, 0] = 1e11
+    agent.until(7)
+    stored = every(agent.buffer)
+    is_same = (stored.next_observations == stored.observations).all(axis=-1)
+    assert is_same.tolist() == [False] * 5 + [True, False]
+    assert stored.rewards[5] == 0.0 and stored.goes_on[5] == 1.0
+    assert not np.array_equal(stored.observations[6], stored.observations[5])
+
+
 def test_prior_data_in_the_same_buffer_end_exploration(learner, acted):
     learner("sacfd", small("sacfd")).until(1)
     assert len(acted) == 1

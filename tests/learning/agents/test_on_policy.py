@@ -165,6 +165,16 @@ def test_a_new_command_cuts_the_returns(begun, monkeypatch):
     assert (before[moving] != after[moving]).any(axis=-1).all()
 
 
+def test_a_step_that_diverges_bootstraps_from_the_observation_before(begun):
+    agent = begun()
+    agent.advance()
+    agent.collector.environment.batch.data.qvel[1, 0] = 1e11
+    rollout, _ = rolled_out(agent)
+    assert rollout["ended"][0, 1] and not rollout["terminated"][0, 1] and rollout["rewards"][0, 1] == 0.0
+    is_same = (rollout["next_observations"][0] == rollout["observations"][0]).all(axis=-1)
+    assert_array_equal(np.flatnonzero(is_same), [1])
+
+
 def test_blocks_of_the_observation_weigh_alike():
     architecture = Perceptron.of(Setup.of("tick", "steer").definition)
     squares = architecture.scale.astype(float) ** 2
