@@ -334,6 +334,10 @@ class ProximalPolicy:
         _check_numbers(self, ranges)
         checks.name(self.simulation, ("mujoco", "mjx", "warp"), "simulation")
         object.__setattr__(self, "style", motion_text.embed(self.style))  # a run holds its motion, as settings do
+        if not self.style and self.style_share != ProximalPolicy.style_share:
+            raise ValueError(
+                f"style_share: expected a motion as style, of which it is the share, got {self.style_share}"
+            )
         registry.find_entry("network", self.network, NETWORKS)
         self.check_minibatch(has_copies=self.symmetry_augmentation and self.network != "legs")
 

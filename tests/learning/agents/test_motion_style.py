@@ -100,6 +100,8 @@ def test_a_run_holds_its_motion(motion):
 
 
 def test_other_learners_and_motions_of_others_are_refused(motion, tmp_path):
+    with refused("style_share: expected a motion as style, of which it is the share, got 0.2"):
+        Configuration.of(Setup.of("tick"), "ppo", {"style_share": 0.2})
     with refused("unknown hyperparameter 'style'", begins=True):
         Configuration.of(Setup.of("tick", "steer"), "sac", {"style": motion}, steps=320)
     with refused("motion 'walk' is of 'tick': expected 12 joints, got 18", begins=True):
