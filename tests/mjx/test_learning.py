@@ -233,7 +233,7 @@ def test_a_policy_is_finetuned_once_values_have_learned(tmp_path, monkeypatch):
     del (hyperparameters := dict(SMALL))["hidden"]
     run = Configuration.of(setup, "finetune", hyperparameters | more, steps=64, evaluate_every=64)
     slices = list(device_learner.learn(run.hyperparameters, run.context(tmp_path)))
-    assert [int(each.checkpoint["iterations"]) for each in slices] == [8, 16]
+    assert [int(each.checkpoint["iterations"]) for each in slices] == [2, 4]
     warm, tuned = (each.checkpoint for each in slices)
     begun = on_policy.begin(run.hyperparameters, run.context(tmp_path), *task_and_architecture(run)).arrays()
     for name, array in begun.items():
