@@ -306,8 +306,9 @@ def default_values(body: str, task: str) -> dict[str, Any]:
         defaults[name] = modifier.defaults[name]
     defaults |= dict(flatten(arc_suite.load(body, task).task.definition.settings))
     for shared_name, names in parameters.SHARED_NOISE.items():
-        if len({defaults[name] for name in names}) == 1:
-            defaults[shared_name] = defaults[names[0]]
+        values = {defaults.get(name) for name in names}  # None in a task without this noise
+        if len(values) == 1:
+            (defaults[shared_name],) = values
     return defaults
 
 

@@ -32,6 +32,11 @@ def test_what_comes_of_a_value_is_told(setting, value, expected):
     assert absurd.outcome(Case("tick", "walk", setting, value)) == expected
 
 
+def test_defaults_of_all_tasks_are_known():
+    noises = {task: absurd.default_values("tick", task).get("base_noise") for task in TASKS}
+    assert noises["walk"] == 0.02 and noises["mimic"] == 0.006 and noises["recover"] is None
+
+
 def test_faults_are_told(monkeypatch):
     case = Case("tick", "walk", "kicks", 3.0)
     monkeypatch.setitem(MODIFIERS["kicks"].defaults, "kicks", 0.0)
