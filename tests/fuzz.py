@@ -241,7 +241,8 @@ def _make_motions() -> None:
 
 
 def _read_motion(path: str) -> None:
-    motion, _ = reading.read(path, registry.body_of("tick"), reading.Options(fps=30.0))
+    fps = 30.0 if path.endswith(".csv") else None  # all other files say it
+    motion, _ = reading.read(path, registry.body_of("tick"), reading.Options(fps=fps))
     motions.resample(motion, 50.0)
 
 

@@ -62,6 +62,13 @@ def test_files_are_damaged_again_in_the_same_way():
     assert 50 < sum(isinstance(parsed(text), dict) for text in texts) < 150
 
 
+@pytest.mark.parametrize("label", [label for label in fuzz.KINDS if "motion" in label or label in ("spec", "tracks")])
+def test_sound_files_are_read(label, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    kind = fuzz.KINDS[label]
+    assert (fuzz.outcome(kind.make), fuzz.outcome(*kind.uses)) == (fuzz.READ, fuzz.READ)
+
+
 @pytest.mark.parametrize(
     ("flags", "kinds"),
     [
