@@ -30,6 +30,7 @@ _GRACE_PERIOD = 20.0  # s, from SIGTERM to the end of the process; clusters give
 _LOG_INTERVAL = 30.0  # s, between two lines of progress in a log
 _EXPECTED_ERRORS = (flags.Error, ValueError, OSError, MemoryError, RenderingUnavailable, PhysicsError)
 _SPECIAL_FLAG = re.compile(r"--?(flagfile|undefok)(=.*)?", re.DOTALL)  # which absl itself takes in every program
+_INTERRUPTED = "interrupted"  # at the start of the line of an interrupt
 _CURSOR_MOVES = re.compile("\\r|\x1b\\[A")  # with which bars overwrite themselves
 
 _HELP = flags.DEFINE_bool("help", False, "Print this text and exit.", short_name="h")
@@ -65,7 +66,7 @@ def resumable(folder: str | os.PathLike[str]) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt as interrupt:
-        raise type(interrupt)(f"interrupted; the same command resumes {folder}") from None
+        raise type(interrupt)(f"{_INTERRUPTED}; the same command resumes {folder}") from None
 
 
 @contextlib.contextmanager
@@ -166,7 +167,8 @@ def guard(work: Callable[[], int | None], name: str, module: ModuleType | None =
             is_interrupt = isinstance(error, KeyboardInterrupt)
             if statuses or is_interrupt:
                 message = str(error) if is_interrupt else ""
-                print_reason(message or "interrupted")
+                is_ours = message.startswith(_INTERRUPTED)  # PyMJCF says in which element the interrupt came
+                print_reason(message if is_ours else _INTERRUPTED)
                 status = statuses[-1] if statuses else interrupts.INTERRUPTED
             elif isinstance(error, _EXPECTED_ERRORS) and not sys.flags.dev_mode:
                 print_reason(places.describe_error(error, module))

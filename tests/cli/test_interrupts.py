@@ -139,6 +139,12 @@ def converted():
     except KeyboardInterrupt:
         raise RuntimeError("of a callback") from None
 
+def described():
+    try:
+        os.kill(os.getpid(), NUMBER)
+    except BaseException as error:  # as PyMJCF does
+        raise type(error)("during initialization of attribute 'class' of element <motor>: ") from None
+
 class Destructible:
     def __del__(self):
         os.kill(os.getpid(), NUMBER)
@@ -153,7 +159,7 @@ def late():
 
 
 @pytest.mark.parametrize("number", STATUSES)
-@pytest.mark.parametrize("loss", ["plain", "resumed", "converted", "lost", "late"])
+@pytest.mark.parametrize("loss", ["plain", "resumed", "converted", "described", "lost", "late"])
 def test_interrupts_are_not_lost(loss, number, tmp_path):
     script = tmp_path / "work.py"
     script.write_text(f"NUMBER = {int(number)}\n{LOSSES}\nprogram.guard({loss}, 'arc-suite study')\n")
