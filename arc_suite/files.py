@@ -36,6 +36,7 @@ _MIN_AGE = 3600.0  # s, of a temporary file of another target
 _MAX_ENTRIES = 1000  # of a folder, among which a similar name is sought
 _LEAST_SIMILARITY = 0.75  # of a name that an error suggests, up to 1
 _ADDRESS = re.compile(r"[a-z][a-z0-9+.-]{1,15}:/", re.IGNORECASE)  # at the start; the drive of a path is one letter
+_MAX_SHOWN = 300  # characters of a path in an error
 _MAX_STEM = 32  # characters of a target's name in the names of its temporary files
 # What JSON wants, by the beginning of the text at which it does not go on.
 _RULES_OF_JSON = {
@@ -52,6 +53,13 @@ _RULES_OF_JSON = {
 }
 
 
+def shorten(path: str | os.PathLike[str]) -> str:
+    """Return a path for an error, without the middle of one that is too long to read."""
+    text = str(path)
+    half = _MAX_SHOWN // 2
+    return text if len(text) <= _MAX_SHOWN else f"{text[:half]}...{text[-half:]}"
+
+
 def folder(path: str | os.PathLike[str]) -> Path:
     """Make a folder if there is none yet, and return its path.
 
@@ -62,7 +70,7 @@ def folder(path: str | os.PathLike[str]) -> Path:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise OSError(f"cannot make folder {path}: {error.strerror.lower()}") from None
+        raise OSError(f"cannot make folder {shorten(path)}: {error.strerror.lower()}") from None
     return path
 
 
@@ -94,7 +102,7 @@ def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
         temporary.touch()
         _delete_old_temporaries(target)
     except OSError as error:
-        raise OSError(f"cannot write {path}: {error.strerror.lower()}") from None
+        raise OSError(f"cannot write {shorten(path)}: {error.strerror.lower()}") from None
     try:
         with naming(path):
             yield temporary
@@ -121,9 +129,9 @@ def check_folder(path: str | os.PathLike[str]) -> None:
     while not nearest.exists() and nearest != nearest.parent:
         nearest = nearest.parent
     if not nearest.is_dir():
-        raise OSError(f"cannot make folder {path}: {nearest} is a file")
+        raise OSError(f"cannot make folder {shorten(path)}: {nearest} is a file")
     if not os.access(nearest, os.W_OK):
-        raise OSError(f"cannot make folder {path}: permission denied in {nearest}")
+        raise OSError(f"cannot make folder {shorten(path)}: permission denied in {nearest}")
 
 
 @contextlib.contextmanager
@@ -138,7 +146,7 @@ def naming(path: str | os.PathLike[str]) -> Iterator[None]:
     except OSError as error:
         if error.errno not in _STORAGE_ERRORS:
             raise
-        raise OSError(f"cannot write {path}: {error.strerror.lower()}") from None
+        raise OSError(f"cannot write {shorten(path)}: {error.strerror.lower()}") from None
 
 
 def write(path: str | os.PathLike[str], text: str) -> None:
@@ -255,10 +263,10 @@ def reading(path: str | os.PathLike[str]) -> Iterator[None]:
     try:
         yield
     except UnicodeDecodeError:
-        raise OSError(f"cannot read {path}: expected text in UTF-8") from None
+        raise OSError(f"cannot read {shorten(path)}: expected text in UTF-8") from None
     except OSError as error:
         cure = suggest_path(path) if isinstance(error, FileNotFoundError) else ""
-        raise OSError(f"cannot read {path}: {(error.strerror or str(error)).lower()}{cure}") from None
+        raise OSError(f"cannot read {shorten(path)}: {(error.strerror or str(error)).lower()}{cure}") from None
 
 
 def is_address(text: str) -> bool:
@@ -428,7 +436,7 @@ def hold_lock(path: str | os.PathLike[str], refusal: str | None = None) -> Itera
         try:
             file = open(path, "ab")  # noqa: SIM115
         except OSError as error:
-            raise OSError(f"cannot write {path}: {error.strerror.lower()}") from None
+            raise OSError(f"cannot write {shorten(path)}: {error.strerror.lower()}") from None
         with file:
             while not lock(file):
                 if refusal is not None:

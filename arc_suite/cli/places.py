@@ -8,6 +8,8 @@ from types import ModuleType
 
 from absl import flags
 
+from arc_suite import files
+
 _PACKAGE_FOLDER = Path(__file__).parents[1]
 _INSTALLED = ("site-packages", "dist-packages")  # folders of installed packages, by interpreter
 _LIBRARIES = [Path(sysconfig.get_path(name)).resolve() for name in ("stdlib", "platstdlib", "purelib", "platlib")]
@@ -31,7 +33,14 @@ def describe_error(error: BaseException, program: ModuleType | None = None) -> s
         if not _is_foreign(code.co_filename, program):
             continue
         function = "" if code.co_name == "<module>" else f", in {_qualified_name(code)}"
-        return f"{error} ({_describe_place(code.co_filename, line)}{function})"
+        return f"{_message(error)} ({_describe_place(code.co_filename, line)}{function})"
+    return _message(error)
+
+
+def _message(error: BaseException) -> str:
+    """Return the message of an error; of one of the operating system, such as of a name too long, file and reason."""
+    if isinstance(error, OSError) and error.strerror and isinstance(error.filename, str | os.PathLike):
+        return f"{files.shorten(error.filename)}: {error.strerror.lower()}"
     return str(error)
 
 

@@ -124,7 +124,7 @@ def look_up(): {}["weight"]
     [
         ("add", "operands could not be broadcast together with shapes (2,) (3,) (carry.py:8, in Carry.terms)"),
         ("check", "legs: expected an integer from 1, got 'two' (carry.py:11, in check)"),
-        ("read", "[Errno 2] No such file or directory: 'missing.txt' (carry.py:12, in read)"),
+        ("read", "missing.txt: no such file or directory (carry.py:12, in read)"),
         ("parse", "could not convert string to float: 'two' (carry.py:14, in parse.<lambda>)"),
         ("warn", "light (carry.py:15)"),
         ("divide", "divide by zero encountered in divide (carry.py:16)"),
@@ -143,6 +143,15 @@ def test_errors_of_other_code_end_with_their_place(tmp_path, function, line):
     assert done.returncode == (0 if function in ("warn", "divide") else 1)
 
 
+@pytest.mark.parametrize("length", [300, 5000])  # of a name, and of a path, both longer than Linux allows
+@pytest.mark.parametrize("words", [["evaluate", "--policy=NAME.npz"], ["check", "NAME.json"], ["card", "NAME"]])
+def test_names_that_are_too_long_are_lines(words, length, tmp_path):
+    command = [word.replace("NAME", "n" * length) for word in words]
+    done = programs.run("-m", "arc_suite", *command, cwd=tmp_path)
+    assert done.returncode == 1 and done.stderr.endswith(": file name too long\n") and "Errno" not in done.stderr
+    assert done.stderr.count("\n") == 1 and len(done.stderr) < 500
+
+
 def test_development_mode_keeps_the_traceback_of_other_code(tmp_path):
     (tmp_path / "carry.py").write_text("raise ValueError('too heavy')")
     command = [sys.executable, "-X", "dev", "-m", "arc_suite", "evaluate", "--task=carry:carry"]
@@ -157,10 +166,10 @@ def test_unexpected_errors_keep_their_traceback(tool):
     assert "Traceback" in done.stderr
 
 
-@pytest.mark.parametrize(("kind", "message"), [("signal", "interrupted"), ("int", "a b")])
-def test_an_interrupt_is_one_line_and_exit_status_130(tool, kind, message):
+@pytest.mark.parametrize("kind", ["signal", "int"])
+def test_an_interrupt_is_one_line_and_exit_status_130(tool, kind):
     done = tool(f"--raises={kind}")
-    assert (done.returncode, done.stdout, done.stderr) == (130, "", f"count.py: {message}\n")
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "count.py: interrupted\n")
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ import programs
 import pytest
 
 import arc_suite
-from arc_suite import checks, data, policies, registry
+from arc_suite import checks, data, files, policies, registry
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy, SoftActorCritic
 
 LONG = "x" * 1_000_000
@@ -30,6 +30,11 @@ PLACES = {
     "task": lambda: arc_suite.load("tick", LONG),
     "setting": lambda: arc_suite.load("tick", "walk", {LONG: 1}),
     "value of a setting": lambda: arc_suite.load("tick", "walk", {"target_velocity": LONG}),
+    "motion": lambda: arc_suite.load("tick", "mimic", {"motion": f"{LONG}.npz"}),
+    "ground": lambda: arc_suite.load("tick", "walk", {"arena": f"{LONG}.png:1x1x1"}),
+    "spec": lambda: arc_suite.load(f"{LONG}.json", "walk"),
+    "folder": lambda: files.folder(LONG),
+    "target": lambda: files.check_target(LONG),
     "policy": lambda: policies.policy(LONG, "tick"),
     "module of a policy": lambda: policies.policy(f"{LONG}:make", "tick"),
     "name of a policy": lambda: policies.policy(f"os:{LONG}", "tick"),
