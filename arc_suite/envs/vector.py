@@ -313,16 +313,17 @@ class VectorEnv(KnownAttributes, BaseVectorEnv):
         is_cut_off = is_cut_off | has_diverged | (self._steps >= self.step_limit)
         # At the limit of `max_episode_steps` a fall is both, as by Gymnasium's `TimeLimit`.
         truncated = is_stepping & ((is_cut_off & ~terminated) | (self._steps >= self._max_episode_steps))
-        self._ended = must_wait | terminated | truncated
+        is_ending = terminated | truncated
+        self._ended = self._ended | is_ending  # a start takes the mark away
 
         info = {}
         has_step_info = is_stepping  # environments whose terms and metrics are in the info itself
-        if self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
-            has_step_info = is_stepping & ~self._ended
-            final_info = self._step_info(self._ended, has_diverged) | self._privileged_info(self._ended)
-            final = {"final_obs": _to_objects(observation, self._ended), "final_info": final_info}
-            info |= _with_masks(final, self._ended)
-            is_starting = is_starting | self._ended  # a snapshot of another mode has ends that wait for a start
+        if self.autoreset_mode == AutoresetMode.SAME_STEP and is_ending.any():
+            has_step_info = is_stepping & ~is_ending
+            final_info = self._step_info(is_ending, has_diverged) | self._privileged_info(is_ending)
+            final = {"final_obs": _to_objects(observation, is_ending), "final_info": final_info}
+            info |= _with_masks(final, is_ending)
+            is_starting = is_starting | is_ending  # a snapshot of another mode has ends that wait for a start
         info |= self._step_info(has_step_info, has_diverged)
         if is_starting.any():
             self._start_episodes(is_starting, observation)

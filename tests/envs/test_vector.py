@@ -420,6 +420,21 @@ def test_time_at_rest_does_not_count():
     assert ends == [[False, False], [False, False], [True, False]]
 
 
+def test_an_end_waits_for_its_start_while_the_environment_rests():
+    environment = VectorEnv("tick", "walk", 2, 1, "NextStep", task_kwargs={"time_limit": 0.2})  # 4 steps
+    environment.reset(seed=0)
+    actions = np.zeros(environment.action_space.shape)
+    ends = [environment.step(actions)[3].tolist() for _ in range(4)]
+    assert ends[3] == [True, True]
+    environment.rest(np.array([True, False]))
+    environment.step(actions)
+    assert environment.snapshot()["steps"].tolist() == [4, 0]
+    environment.rest(np.array([False, True]))
+    _, rewards, _, truncated, _ = environment.step(actions)  # starts the next episode of environment 0
+    assert (rewards.tolist(), truncated.tolist()) == ([0.0, 0.0], [False, False])
+    assert environment.snapshot()["steps"].tolist() == [0, 0]
+
+
 def test_ends_of_another_mode_start_in_the_next_step():
     settings = {"time_limit": 0.5, "random": 0}  # 10 steps
     donor = VectorEnv("queen", "walk", 2, 1, "Disabled", task_kwargs=settings)
