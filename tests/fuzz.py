@@ -226,6 +226,11 @@ def _begin_run() -> None:
     publication.publish([_run()], pathlib.Path("runs"), pathlib.Path("published"))
 
 
+def _finish_run() -> None:
+    train(_run().configuration, pathlib.Path("runs", RUN), progress=QUIET)
+    publication.publish([_run()], pathlib.Path("runs"), pathlib.Path("published"))
+
+
 def _make_motions() -> None:
     """Leave a motion as files of all kinds; of the .glb, its JSON and its buffer, too."""
     body = registry.body_of("tick")
@@ -285,7 +290,7 @@ def _copy_studies() -> None:
     shutil.copy(ROOT / "studies" / benchmark.SCORES, "studies")
 
 
-TABLES = (*run_folder.TABLES, "style", "final")
+TABLES = (*run_folder.TABLES, "style")  # of a run that has begun
 RUN, STUDY = "tick-walk-tiny_studies.climb-0", "samples-sac"
 _USES_OF_RUNS = (_resume_run, _publish, _act_by_run)
 KINDS = {
@@ -319,6 +324,7 @@ KINDS = {
         )
         for name in ("config.json", "checkpoint.npz", "policy.npz", *(f"{table}.csv" for table in TABLES))
     },
+    "final.csv of a run": Kind(f"runs/{RUN}/final.csv", _finish_run, _USES_OF_RUNS, table=damages.CSV),
     **{
         f"{name} of a study": Kind(f"studies/{STUDY}/{name}", _copy_studies, (_read_study,), table=damages.CSV)
         for name in (results.RUNS, results.EVALUATIONS, results.DEMONSTRATORS)

@@ -134,7 +134,7 @@ def _license_text(run: Configuration) -> str:
 
 def _read_returns(folder: Path) -> tuple[np.ndarray, str]:
     """Return the returns of the episodes that judge the policy, or of the latest evaluation, and what they are."""
-    final_lines = run_folder.lines(folder, finals.TABLE)
+    final_lines = run_folder.lines(folder, finals.TABLE, finals.COLUMNS)
     if finals.are_of(final_lines, network.digest(network.load(folder))):  # a run goes on after its judging
         return np.array([line["return"] for line in final_lines], float), "judging episodes"
     return run_folder.latest_returns(run_folder.table(folder, "evaluations")), "episodes of the latest evaluation"

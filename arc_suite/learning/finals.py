@@ -48,7 +48,7 @@ def play_once(
     """
     policy = network.load(folder / checkpoints.FOLDER / str(step))
     sha256 = network.digest(policy)
-    final_lines = run_folder.lines(folder, TABLE)
+    final_lines = run_folder.lines(folder, TABLE, COLUMNS)
     if not are_of(final_lines, sha256):
         final_lines = _play(run.validation, policy, sha256, threads, progress)
         lines = [",".join(final_lines[0]), *(",".join(row.values()) for row in final_lines)]

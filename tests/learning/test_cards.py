@@ -208,6 +208,9 @@ def test_a_card_tells_the_returns_of_its_policy_and_not_of_an_earlier_one(tmp_pa
     for other_rows in ([row.replace(sha256, "0" * 64) for row in rows], rows[:-1]):
         card = write_finals(other_rows)
         assert f"| return | {latest.mean():.1f}, " in card and "10 episodes of the latest evaluation |" in card
+    (tmp_path / "run" / "final.csv").write_text(f"policy_sha256,return,length\n{sha256},7.0,5\n")
+    with pytest.raises(ValueError, match=r"final\.csv: no table of a run: expected a column seed$"):
+        cards.write(run, tmp_path / "run")
 
 
 def test_the_program_draws_the_policy(folder):
