@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-# NumPy's, of which committed hashes are.
+# NumPy's defaults: the hashes in committed tables are of texts that they give.
 _DEFAULT_PRINT_OPTIONS: Mapping[str, Any] = {
     "edgeitems": 3,
     "floatmode": "maxprec",
