@@ -347,7 +347,7 @@ def outcome(case: Case) -> str:
     try:
         if any(has_effect(case, seed) for seed in SEEDS):
             return EFFECT
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, OSError) as error:
         return judge_line(case, error)
     except Exception:
         traceback.print_exc()

@@ -64,11 +64,12 @@ def read(word: Any) -> Motion:
         ValueError: no path, or a file or a text without a motion.
         OSError: the file cannot be read.
     """
-    if isinstance(word, os.PathLike):
+    if isinstance(word, str | os.PathLike) and names_file(word):
         return load(word)
-    if not isinstance(word, str):
-        raise ValueError(f"motion: expected the path of a file or a motion as text, got {checks.preview(word)}")
-    return from_text(word) if is_text(word) else load(word)
+    if not is_text(word):
+        expected = f"expected the path of a file {EXTENSION} or a motion as text"
+        raise ValueError(f"motion: {expected}, got {checks.preview(word)}")
+    return from_text(word)
 
 
 def embed(words: Any) -> Any:

@@ -214,7 +214,9 @@ def test_motions_that_do_not_fit_are_refused_in_one_line(tmp_path):
         arc_suite.load("queen", "mimic", {"motion": text})
     for motion, message in (
         ([], "motion: expected a motion, or a list of up to 64, got []"),
-        ([3], "motion: expected the path of a file or a motion as text, got 3"),
+        ([3], "motion: expected the path of a file .npz or a motion as text, got 3"),
+        ([["a.npz"]], "motion: expected the path of a file .npz or a motion as text, got ['a.npz']"),
+        ("trot", "motion: expected the path of a file .npz or a motion as text, got 'trot'"),
         (None, "motion: expected a motion, or a list of up to 64, got None"),
         ("{", "motion: expected a name, a file or a motion as text: "),
         (text.replace('"frames": 31', '"frames": 1000000000'), "motion: expected a name, a file or a motion as text: "),
