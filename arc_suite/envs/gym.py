@@ -329,6 +329,7 @@ class Env(KnownAttributes, _Adapter):
         self._window.show(self.dt, decorated.markers)
 
     def __getstate__(self):
+        self._check_open("copy")
         return self.__dict__ | {"_window": None}
 
 

@@ -75,7 +75,9 @@ class VectorTask(TaskView, KnownAttributes):
 
         Raises:
             ResetNeeded: before the first reset.
+            ClosedEnvironmentError: after `close`.
         """
+        self._environment._check_open("read privileged observations")
         self._check_begun()
         return self._environment._privileged_blocks()
 

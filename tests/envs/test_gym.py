@@ -286,6 +286,7 @@ def test_closed_environments_say_so(env_id):
         ("reset", env.reset),
         ("step", lambda: env.step(np.zeros(env.action_space.shape, np.float32))),
         ("render", env.render),
+        ("copy", lambda: copy.deepcopy(env)),
     ):
         with refused(f"cannot {call}: the environment is closed; make a new one", ClosedEnvironmentError):
             use()

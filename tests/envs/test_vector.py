@@ -371,7 +371,7 @@ def test_calls_at_the_wrong_time():
     batch.reset()
     batch.close()
     batch.close()
-    for call in (batch.reset, batch.render, lambda: batch.step(np.zeros((3, 18)))):
+    for call in (batch.reset, batch.render, lambda: batch.step(np.zeros((3, 18))), lambda: batch.task.privileged):
         with pytest.raises(ClosedEnvironmentError, match="the environment is closed; make a new one$"):
             call()
 
