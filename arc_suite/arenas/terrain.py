@@ -33,7 +33,7 @@ _CELL = 0.5  # of the height field
 _GRAIN = 1.0 / 16.0  # length of a cell of stairs and trenches; it is adapted so that a width is a multiple
 _THICKNESS = 2.0  # of the ground; boxes that are higher over the plane below them reach down to it
 _TRENCH_DEPTH = 0.6
-_HURDLE_GRAINS = 4  # length of a hurdle in cells; points of a height scan are nearer to each other
+_HURDLE_LENGTH = 0.25  # rounded to cells; points of a height scan are nearer to each other
 _RUN_UP = (7.0, 9.0)  # level ground before a trench or hurdle to leap over
 
 
@@ -113,7 +113,7 @@ def _trenches(random: np.random.RandomState, obstacle: Obstacle, cells: np.ndarr
 
 def _hurdles(random: np.random.RandomState, obstacle: Obstacle, cells: np.ndarray, grain: float) -> np.ndarray:
     """Return thin bars with run-ups."""
-    return _repeat_obstacle(cells, _HURDLE_GRAINS, _run_ups(random, cells, grain), obstacle.rise)
+    return _repeat_obstacle(cells, round(_HURDLE_LENGTH / grain), _run_ups(random, cells, grain), obstacle.rise)
 
 
 def _run_ups(random: np.random.RandomState, cells: np.ndarray, grain: float) -> np.ndarray:

@@ -11,7 +11,7 @@ from tiers import tiers, turns
 
 import arc_suite
 from arc_suite import models
-from arc_suite.arenas import ARENAS, FLAT
+from arc_suite.arenas import ARENAS, FLAT, terrain
 from arc_suite.bodies import generator
 from arc_suite.cpg import Demonstrator
 from arc_suite.robots import ROBOTS
@@ -111,3 +111,14 @@ def test_an_arena_is_a_value():
     environment = arc_suite.load("queen", "walk", {"arena": ARENAS["bumps"](ROBOTS["queen"])})
     assert environment.task.definition.scene.arena == ARENAS["bumps"](ROBOTS["queen"])
     assert environment.physics.render(48, 64).std() > 5
+
+
+@pytest.mark.parametrize(("width", "length"), [(0.15, 0.225), (0.16, 0.8 / 3.0), (0.5, 0.25)])
+def test_hurdles_are_a_quarter_long_to_the_nearest_cell_next_to_trenches_of_any_width(width, length):
+    queen = ROBOTS["queen"]
+    unit = queen.torso.standing_height
+    lanes = terrain.make_lanes(queen, {"trenches": 1, "hurdles": 1}, 40.0, sizes_in_meters={"width": width * unit})
+    x = np.arange(0.0, 40.0, 0.001)
+    is_on_hurdle = lanes.height(x * unit, np.full(len(x), lanes.start(1))) > 0.0
+    first, last = np.flatnonzero(np.diff(is_on_hurdle))[:2]
+    assert x[last] - x[first] == pytest.approx(length, abs=0.0021)
