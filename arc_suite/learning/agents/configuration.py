@@ -118,8 +118,6 @@ class Configuration:
             raise ValueError(f"prior: expected the id of a dataset, got {checks.preview(prior)}")
         training = {**setup.training_settings, **checks.mapping("training", training)}
         _check_training(setup, definition, training)
-        # As in a setup, ground and motions of files become texts, and names of other packages have their modules.
-        embedded_training = setup.with_settings(training, dropped=setup.task_kwargs)
         return cls(
             setup=setup,
             algorithm=registry.importable_name("algorithm", registry.bare_name(algorithm)),
@@ -128,7 +126,7 @@ class Configuration:
             steps=steps,
             evaluate_every=evaluate_every,
             prior=prior,
-            training_json=embedded_training.settings_json,
+            training_json=_embed_training(setup, training),
         )
 
     @property
@@ -451,6 +449,11 @@ def _check_training(setup: Setup, definition: algorithms.Algorithm, training: Ma
         if name in ("random", "exclude_blocks"):
             reason = "as every run has a seed" if name == "random" else "as it is a hyperparameter"
             raise ValueError(f"training: setting {name}: expected none, {reason}, got {checks.preview(training[name])}")
+
+
+def _embed_training(setup: Setup, training: Mapping[str, Any]) -> str:
+    """Return the settings of training as JSON, with ground and motions of files as texts, as a setup has them."""
+    return setup.with_settings(training, dropped=setup.task_kwargs).settings_json
 
 
 def _changed_training(setup: Setup, training: Mapping[str, Any]) -> dict[str, Any]:
