@@ -539,6 +539,7 @@ def test_named_environments_are_steer_with_modifiers_that_callers_can_change():
 
 
 NUMBER, OR_TWO = "expected a number from 0 to 100", "or two of them, the lower first"
+LEG = "expected true, false or the index of a leg, 0 to 5"
 BLOCKS = ("posture", "velocities", "contact_forces", "gait_clock")
 LISTED = ", ".join(BLOCKS)
 
@@ -549,9 +550,9 @@ LISTED = ", ".join(BLOCKS)
         ({"kick": 1.0}, "unknown setting of walk 'kick'; did you mean 'kicks'? (there are: "),
         ({"kicks": -1.0}, f"kicks: {NUMBER}, got -1.0"),
         ({"kicks": True}, f"kicks: {NUMBER}, got True"),
-        ({"actuator_failure": 6}, "actuator_failure: expected an integer from 0 to 5, got 6"),
-        ({"actuator_failure": -1}, "actuator_failure: expected an integer from 0 to 5, got -1"),
-        ({"actuator_failure": "left"}, "actuator_failure: expected an integer from 0 to 5, got 'left'"),
+        ({"actuator_failure": 6}, f"actuator_failure: {LEG}, got 6"),
+        ({"actuator_failure": -1}, f"actuator_failure: {LEG}, got -1"),
+        ({"actuator_failure": "left"}, f"actuator_failure: {LEG}, got 'left'"),
         ({"motor_strength": -0.1}, f"motor_strength: expected a number from 0 to 1, {OR_TWO}, got"),
         ({"friction": (1.0, 0.5)}, f"friction: {NUMBER}, {OR_TWO}, got"),
         ({"friction": (1, 2, 3)}, f"friction: {NUMBER}, {OR_TWO}, got (1, 2"),

@@ -77,16 +77,11 @@ class Motors(_MotorsFields, Modifier):
     @classmethod
     def of(cls, settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]) -> Self:
         """Return the modifier that settings ask for."""
-        failure = settings["actuator_failure"]
-        if isinstance(failure, bool | np.bool_):
-            failure = bool(failure)
-        else:
-            failure = checks.integer("actuator_failure", failure, 0, len(body.legs) - 1)
         return cls(
             motor_strength=cls.check_span("motor_strength", settings),
             joint_strength=cls.check_span("joint_strength", settings),
             armature=cls.check_span("armature", settings),
-            actuator_failure=failure,
+            actuator_failure=_check_failure(settings["actuator_failure"], len(body.legs)),
             are_servos=bool(body.source),
             have_drags=have_drags(body),
         )
@@ -199,6 +194,21 @@ class Motors(_MotorsFields, Modifier):
             return ()
         failed_indices = _find_legs_of_joints(scene.body)[state.failing].tolist()
         return tuple(leg.name for index, leg in enumerate(scene.body.legs) if index in failed_indices)
+
+
+def _check_failure(failure: Any, legs: int) -> bool | int:
+    """Return the setting `actuator_failure` of a body with a number of legs as a Python value.
+
+    Raises:
+        ValueError: it is neither a boolean nor the index of a leg.
+    """
+    if isinstance(failure, bool | np.bool_):
+        return bool(failure)
+    try:
+        return checks.integer("actuator_failure", failure, 0, legs - 1)
+    except ValueError:
+        expected = f"expected true, false or the index of a leg, 0 to {legs - 1}"
+        raise ValueError(f"actuator_failure: {expected}, got {checks.preview(failure)}") from None
 
 
 def _find_legs_of_joints(body: Body) -> np.ndarray:
