@@ -226,7 +226,7 @@ class Physics(dm_mujoco.Physics):
         self,
         height: int = 480,
         width: int = 640,
-        camera_id: int | str | mujoco.MjvCamera = "tracking",
+        camera_id: int | str | Any = "tracking",  # editors do not know the type of a placed camera
         **kwargs: Any,
     ) -> np.ndarray:
         """Draw the decorated body in its present pose; other arguments as in dm_control.

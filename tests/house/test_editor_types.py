@@ -19,13 +19,13 @@ pytest.importorskip("mypy")
 # Page and number of a block of Python.
 PROGRAMS = (
     *(("README", 0), ("README", 1), ("first_steps", 2), ("first_steps", 3), ("bodies", 0), ("bodies", 2)),
-    *(("demonstrators", 1), ("directed", 0), ("modifiers", 0), ("study", 0), ("pages", 0), ("doors", 6)),
+    *(("demonstrators", 1), ("directed", 0), ("modifiers", 0), ("study", 0), ("pages", 0), ("doors", 7)),
     *(("environments", 1), ("observations", 3), ("coming_from_dm_control", 0)),
 )
 # Those whose functions have no annotations, as people write them, and those that use what other packages leave open.
 PLAIN_PROGRAMS = (
     *(("adding_a_task", 0), ("adding_a_task", 2), ("adding_a_task", 5), ("adding_a_robot", 0), ("observations", 1)),
-    *(("doors", 0), ("doors", 2), ("doors", 5), ("coming_from_gymnasium", 0)),
+    *(("doors", 0), ("doors", 2), ("doors", 5), ("doors", 6), ("coming_from_gymnasium", 0)),
 )
 PLAIN = ("--allow-untyped-defs", "--allow-untyped-calls", "--allow-incomplete-defs")
 ARRAY = "numpy.ndarray[tuple[Any, ...], numpy.dtype[Any]]"
